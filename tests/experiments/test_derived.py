@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from lab_records import STEP, STIFFNESS, columns, record, rig, stepped, two_states
+from lab_records import STEP, STIFFNESS, TRUTH, columns, record, rig, stepped, two_states
 
 TRUE_LEVEL = -0.0035
 
@@ -35,6 +35,25 @@ def test_derived_numbers_are_those_of_the_rig_and_their_errors_those_of_draws():
     text = str(fit)
     assert all(f"  {name} " in text for name in found)
     assert fit.to_dict()["derived"]["a - b"]["error"] == found["a - b"].error
+
+
+@pytest.mark.parametrize(
+    ("b", "seed"),
+    [(0.0145, 1), *(pytest.param(b, n, marks=pytest.mark.campaign) for b in (0.008, 0.0145) for n in range(2, 6))],
+)
+def test_steady_sliding_tells_a_minus_b_where_samples_miss_the_transient(b, seed, tmp_path):
+    """These tell a and b, d_c and k only together, but the levels before and after tell the difference."""
+    found = columns(rig(b=b), STEP, 20)
+    friction = found["friction"] + 3e-5 * np.random.default_rng(seed).standard_normal(20)
+    fit = ss.fit(ss.lab_rig(), ss.record_from_arrays(**found | {"friction": friction}))
+    assert not all(fit[name].determined for name in ("friction.a", "friction.b"))
+    assert list(by_name(fit)) == ["a - b"]
+    level = fit["a - b"]
+    assert level.error < 1e-4
+    assert abs(level.value - (TRUTH["a"] - b)) < 3.5 * level.error
+    assert "  a - b  " in str(fit)
+    fit.save(tmp_path / "fit.nc")
+    assert ss.load_fit(tmp_path / "fit.nc").derived == fit.derived
 
 
 @pytest.mark.campaign

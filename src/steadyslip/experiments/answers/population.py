@@ -41,7 +41,7 @@ from steadyslip.files.sealed import FileKind
 
 FEWEST = 3  # experiments that determine a parameter: two cannot tell a spread from a difference
 ENDS = (0.025, 0.16, 0.5, 0.84, 0.975)  # probabilities of the quantiles: median, and 68 % and 95 % intervals
-POPULATION = FileKind("population", 2, 2**30, "make the population of its fits again and save it anew")
+POPULATION = FileKind("population", 3, 2**30, "make the population of its fits again and save it anew")
 _ATTRIBUTES = {"names": str, "scale": float, "chains": int, "steps": int, "time": float}
 _NAMES = {"experiments": [str], "parameters": [str], "conditions": [str]}
 _COLUMNS = {

@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.version import version
 from steadyslip.experiments.fitting.comparison import Comparison, DataComparison
-from steadyslip.experiments.fitting.estimates import combinations, prior_information
+from steadyslip.experiments.fitting.estimates import combinations, prior_information, whole_covariance
 from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.search import SearchSummary, times_of_changes
@@ -124,13 +124,16 @@ def fit_with_errors(
             search = replace(search, converged=True)
         else:  # curvature beside the minimum says nothing of errors
             covariance = np.diag(np.full(free, np.inf))
-    ssq = float(residuals @ residuals)
+    ssq, near = float(residuals @ residuals), z[None]
     if search.converged:
-        covariance, opened = along_valleys(plan, comparison, z, bounds, information, covariance)
+        covariance, opened, near = along_valleys(plan, comparison, z, bounds, information, covariance)
         undetermined += opened
         if undetermined:
             names = [one.name for one in comparison.space.unknowns]
             held = names.index(next(iter(undetermined[0].weights)))
             variance = max(noise.inflation * float(noise.covariance[0]) for noise in noises)
-            covariance = along_open(plan, comparison, z, bounds, covariance, held, variance)
-    return made(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, version()).with_memories()
+            covariance, others = along_open(plan, comparison, z, bounds, covariance, held, variance)
+            near = np.concatenate([near, others])
+    found = made(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, version())
+    whole = whole_covariance(information + scale * known, spread + scale**2 * known)
+    return found.with_open(whole, near).with_memories()

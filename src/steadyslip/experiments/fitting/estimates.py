@@ -110,6 +110,28 @@ class Combination:
         return f"{moved} fits as well: these data tell them only together; fix one of them"
 
 
+def whole_covariance(information: Array, spread: Array) -> Array:
+    """Covariance (p, p) of the coordinates, of those too that `combinations` leaves without an error.
+
+    Along directions of which the data tell nothing it goes as far as anybody believes.
+    """
+    covariance, blind = _linear_covariance(information, spread)
+    for direction in blind:
+        covariance += MOST_REACH**2 * np.outer(direction, direction) / max(float(np.max(direction**2)), 1e-300)
+    return covariance
+
+
+def _linear_covariance(information: Array, spread: Array) -> tuple[Array, Array]:
+    """Covariance (p, p) along what has an effect on the model, and the directions (m, p) of what has none."""
+    size = np.sqrt(np.maximum(np.diag(information), 0.0))
+    insensitive = size <= DERIVATIVE_ROUNDING * max(float(size.max(initial=0.0)), 1e-300)
+    scale = np.where(insensitive, 1.0, size)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    known = values > EIGENVALUE_ROUNDING * max(float(values.max(initial=0.0)), 1e-300)
+    inverse = vectors[:, known] / values[known] @ vectors[:, known].T / np.outer(scale, scale)
+    return inverse @ spread @ inverse, (vectors[:, ~known] / scale[:, None]).T
+
+
 def combinations(information: Array, spread: Array, space: Space) -> tuple[Array, tuple[Combination, ...]]:
     """Covariance of the coordinates, and the combinations of parameters that are not determined.
 
@@ -127,16 +149,9 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
         inf on the diagonal where a parameter is not determined.
     found : tuple of Combination
     """
-    size = np.sqrt(np.maximum(np.diag(information), 0.0))
-    insensitive = size <= DERIVATIVE_ROUNDING * max(float(size.max(initial=0.0)), 1e-300)
-    scale = np.where(insensitive, 1.0, size)
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    known = values > EIGENVALUE_ROUNDING * max(float(values.max(initial=0.0)), 1e-300)
-    inverse = vectors[:, known] / values[known] @ vectors[:, known].T / np.outer(scale, scale)
-    covariance = inverse @ spread @ inverse
+    covariance, blind = _linear_covariance(information, spread)
     found, undetermined = [], np.zeros(len(space), dtype=bool)
-    for i in np.flatnonzero(~known):
-        direction = vectors[:, i] / scale
+    for direction in blind:
         lost = np.abs(direction) > 1e-3 * np.max(np.abs(direction))
         found.append(combination(direction, np.inf, space, lost))
         undetermined |= lost

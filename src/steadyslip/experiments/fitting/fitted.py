@@ -219,6 +219,18 @@ class Fitted(ReadOnly):
         size = len(self.space)
         return deviance + 2 * size, deviance + size * float(np.log(max(independent, 2.0)))
 
+    def with_open(self, covariance: Array, near: Array) -> Self:
+        """The same fit; of a slider, with errors of what follows from parameters that have none.
+
+        Parameters
+        ----------
+        covariance : ndarray (p, p)
+            Of the coordinates, of those too that are not determined.
+        near : ndarray (m, p)
+            Places that fit as well.
+        """
+        return self
+
     def with_memories(self) -> Self:
         """The same fit; of a slider, without an error of what a memory of normal stress moves far that fits as well."""
         return self

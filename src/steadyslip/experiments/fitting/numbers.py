@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.comparison import Comparison
-from steadyslip.experiments.fitting.derived import DERIVED, Minimum, derived_estimates, derived_values
+from steadyslip.experiments.fitting.derived import DERIVED, Minimum, derived_estimates, derived_values, joint_errors
 from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes, opened, stress_alone
@@ -29,9 +30,13 @@ DIFFERENCE = re.compile(r"^\s*(a\s*[-−]\s*b|b\s*[-−]\s*a)(?=@|\s*$)")  # a l
 
 @dataclass(frozen=True, eq=False)
 class FitNumbers(Fitted):  # noqa: D101 -- its base has it
-    __doc__ = Fitted.__doc__
+    __doc__: str | None = f"""{(Fitted.__doc__ or "").rstrip()}
+    joint : mapping of str to float
+        Errors of numbers that follow from parameters of which some are not determined; see `derived.joint_errors`.
+    """
 
     plan: Plan
+    joint: Mapping[str, float] = field(default_factory=dict, repr=False)
 
     @cached_property
     def comparison(self) -> Comparison:
@@ -113,6 +118,17 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
             return remedies(self.plan, reached, self.values)
         return tuple(one.remedy for one in self._equal_memories()) if forgets else ()
 
+    def with_open(self, covariance: Array, near: Array) -> Self:
+        """The same fit, with errors of what follows from parameters that have none; see `Fitted.with_open`."""
+        if not self._minimum.lost or not self.search.converged:
+            return self
+        return replace(self, joint=self._joint(replace(self._minimum, covariance=covariance), self.covariance, near))
+
+    def _joint(self, minimum: Minimum, covariance: Array, near: Array) -> dict[str, float]:
+        """Errors, by `minimum`, of what follows from parameters that have none in a covariance (p, p)."""
+        rigs, lost = [part.rig for part in self.comparison.parts], replace(minimum, covariance=covariance).lost
+        return joint_errors(minimum, rigs, self.plan.calibrated, lost, near) if lost else {}
+
     def with_memories(self) -> Self:
         """The same fit, with wider errors of what a memory of normal stress that fits as well moves, or none if far.
 
@@ -125,8 +141,11 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         if not (rivals or forgets):
             return self
         equal = [one for one in rivals if one.remedy.gain < STRONG_EVIDENCE]
-        covariance, found = opened(self.space, self.covariance, equal if len(equal) == len(rivals) else [])
-        same = replace(self, covariance=covariance, unidentified=self.unidentified + found)
+        equal = equal if len(equal) == len(rivals) else []
+        covariance, found = opened(self.space, self.covariance, equal)
+        near = self.coordinates + np.array([np.zeros(len(self.space)), *(one.shift(self.space) for one in equal)])
+        same = replace(self, covariance=covariance, unidentified=self.unidentified + found,
+                       joint=self._joint(self._minimum, covariance, near))  # fmt: skip
         same.__dict__["remedies"] = tuple(one.remedy for one in rivals)
         return same
 
@@ -142,7 +161,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
 
     @property
     def _minimum(self) -> Minimum:
-        return Minimum(self.space, self.coordinates, self.covariance, self.degrees)
+        return Minimum(self.space, self.coordinates, self.covariance, self.degrees, self.joint)
 
     @property
     def _ends(self) -> dict[str, tuple[float, float]]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, fields, replace
+from functools import partial
 from itertools import chain
 from os import PathLike
 from typing import Any, TypeVar
@@ -32,7 +33,7 @@ from steadyslip.experiments.numerics.smoothing import Smooth
 from steadyslip.files.result_tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.files.sealed import FileKind
 
-FIT = FileKind("fit", 9, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
+FIT = FileKind("fit", 10, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
 RESULT_ATTRIBUTES = {"ssq": float, "search": str, "unidentified": str, "noise": str, "steadyslip": str}
 ATTRIBUTES = RESULT_ATTRIBUTES | dict.fromkeys(("rig", "options", "records", "loading", "refits"), str)
 _OPTIONS = {
@@ -59,11 +60,13 @@ _FORMS = RESULT_FORMS | {
         "measured": [{str: float}],
         "ramps": [(float, float, {str: float})],
         "remedies": [(str, float, float, float, {str: float})],
+        "joint": {str: float},
     },
 }
 
 
 F = TypeVar("F", bound=Fitted)
+S = TypeVar("S", bound=FitNumbers)
 
 
 def result_variables(fit: Fitted, samples: Sequence[str]) -> dict[str, Any]:
@@ -108,7 +111,9 @@ def result_attributes(fit: Fitted) -> dict[str, Any]:
     }
 
 
-def result_of(table: ExpectedTable, found: dict[str, Any], stored: dict[str, Any], made: type[F], plan: Any) -> F:
+def result_of(
+    table: ExpectedTable, found: dict[str, Any], stored: dict[str, Any], made: Callable[..., F], plan: Any
+) -> F:
     """Fit from the columns and attributes that all fits have, of the class `made`; a damaged one is refused."""
     names = [one.name for one in plan.space().unknowns]
     if not (names == found["parameter"] == found["other"]):
@@ -168,6 +173,7 @@ def to_dataset(fit: FitNumbers) -> Any:
                 "measured": [] if fit.as_measured is None else [fit.as_measured],
                 "ramps": [[one.share, one.ssq, one.values] for one in fit.as_ramps],
                 "remedies": [[one.choice, one.ssq, one.gain, one.p, one.values] for one in fit.remedies],
+                "joint": dict(fit.joint),
             }
         ),
     }
@@ -186,7 +192,7 @@ def save(fit: FitNumbers, path: str | PathLike[str]) -> None:
     write_table(path, FIT, to_dataset(fit))
 
 
-def read(path: str | PathLike[str], made: type[F]) -> F:
+def read(path: str | PathLike[str], made: type[S]) -> S:
     """Read a fit that `save` wrote, as an instance of the class `made`.
 
     Nothing in the file is executed; a damaged file is refused.
@@ -199,7 +205,7 @@ def read(path: str | PathLike[str], made: type[F]) -> F:
     return from_table(ExpectedTable(path, FIT, ATTRIBUTES), made)
 
 
-def from_table(table: ExpectedTable, made: type[F]) -> F:
+def from_table(table: ExpectedTable, made: type[S]) -> S:
     """Read a fit from a file, or from a part of one, with the attributes `ATTRIBUTES`."""
     stored = {name: table.json(table.attributes[name], form) for name, form in _FORMS.items()}
     described, noises, loading = stored["records"], stored["noise"], stored["loading"]
@@ -218,8 +224,8 @@ def from_table(table: ExpectedTable, made: type[F]) -> F:
     if known:
         plan = replace(plan, beginnings=tuple(_beginning(table, plan, found[f"beginning_{i + 1}"])
                                               for i in range(len(records))))  # fmt: skip
-    fit = result_of(table, found, stored, made, plan)
     refits = stored["refits"]
+    fit = result_of(table, found, stored, partial(made, joint=refits["joint"]), plan)
     stored_results = {  # results that the file holds, so that nothing is computed again
         "as_measured": next(iter(refits["measured"]), None),
         "as_ramps": tuple(RampFit(*one) for one in refits["ramps"]),

@@ -49,8 +49,10 @@ class _Valley:
 
 def along_valleys(
     plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], information: Array, covariance: Array
-) -> tuple[Array, tuple[Combination, ...]]:
-    """Covariance (p, p), widened or infinite along a valley, and the combination that it leaves open.
+) -> tuple[Array, tuple[Combination, ...], Array]:
+    """Covariance (p, p), widened or infinite along a valley, the combination that it leaves open, and places in it.
+
+    The places (m, p) fit as well as the minimum does.
 
     Parameters
     ----------
@@ -63,9 +65,9 @@ def along_valleys(
     """
     valley = _valley(comparison, information, covariance)
     if valley is None:
-        return covariance, ()
+        return covariance, (), z[None]
     unit = _unit_of_rise(information, covariance, valley.held)
-    reached = _reached(plan, comparison, z, bounds, valley, unit)
+    reached, near = _reached(plan, comparison, z, bounds, valley, unit)
     known = np.isfinite(np.diag(covariance)) & (valley.share >= 0)
     part = np.where(known, reached**2 / np.maximum(np.diag(covariance), 1e-300), 0.0)  # of its variance
     stretch = np.where(known, np.sqrt(np.maximum(1 - valley.share + part, 1.0)), 1.0)
@@ -73,18 +75,20 @@ def along_valleys(
     deviation = float(np.linalg.norm(reached[known]))
     wider = np.where(np.isfinite(covariance), covariance * np.outer(stretch, stretch), covariance)
     if deviation <= UNDETERMINED:
-        return wider, ()
+        return wider, (), near
     lost = (part > OPEN_SHARE) & (reached > LEAST_CHANGE)
     wider[lost, :] = wider[:, lost] = 0.0
     wider[lost, lost] = np.inf
-    return wider, (combination(np.copysign(reached, valley.axis), deviation, comparison.space, lost),)
+    return wider, (combination(np.copysign(reached, valley.axis), deviation, comparison.space, lost),), near
 
 
 def along_open(
     plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], covariance: Array, held: int,
     variance: float,
-) -> Array:  # fmt: skip
+) -> tuple[Array, Array]:  # fmt: skip
     """Covariance (p, p) without errors of what changes along an open direction, in which the model is not linear.
+
+    And places (m, p) along it that fit as well as the minimum does.
 
     Parameters
     ----------
@@ -97,14 +101,15 @@ def along_open(
     """
     axis = np.zeros(len(z))
     axis[held] = 1.0
-    reached = _reached(plan, comparison, z, bounds, _Valley(held, axis, np.zeros(len(z))), variance, OPEN_DISTANCES)
+    valley = _Valley(held, axis, np.zeros(len(z)))
+    reached, near = _reached(plan, comparison, z, bounds, valley, variance, OPEN_DISTANCES)
     own = np.diag(covariance)
     times = np.array([is_time(one) for one in comparison.space.unknowns])
     lost = np.isfinite(own) & ~times & (reached**2 > OPEN_SHARE * own) & (reached > LEAST_CHANGE)
     found = covariance.copy()
     found[lost, :] = found[:, lost] = 0.0
     found[lost, lost] = np.inf
-    return found
+    return found, near
 
 
 def _valley(comparison: DataComparison, information: Array, covariance: Array) -> _Valley | None:
@@ -137,8 +142,11 @@ def _unit_of_rise(information: Array, covariance: Array, i: int) -> float:
 def _reached(
     plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], valley: _Valley, unit: float,
     distances: tuple[float, ...] = DISTANCES,
-) -> Array:  # fmt: skip
-    """Standard deviations (p,) that the ends of the valley stand for, on the side where each parameter goes further."""
+) -> tuple[Array, Array]:  # fmt: skip
+    """Standard deviations (p,) that the ends of the valley stand for, on the side where each parameter goes further.
+
+    And places (m, p) on the way where the sum of squares is not above what 95 % need.
+    """
     away = np.array([side * own for side in (-1.0, 1.0) for own in distances])
     begin = np.clip(z + away[:, None] * valley.axis, *bounds)
     held = np.zeros_like(begin, dtype=bool)
@@ -150,7 +158,8 @@ def _reached(
     rise = np.where(np.isfinite(ends.ssq), np.maximum(ends.ssq - least, 0.0), np.inf) / unit
     moved = np.abs(ends.coordinates - z)
     sides = (slice(0, count), slice(count, 2 * count))
-    return np.asarray(np.max([_end(moved[side], np.sqrt(rise[side])) for side in sides], axis=0) / REACH)
+    reached = np.max([_end(moved[side], np.sqrt(rise[side])) for side in sides], axis=0) / REACH
+    return np.asarray(reached), ends.coordinates[rise <= REACH**2]
 
 
 def _end(moved: Array, roots: Array) -> Array:

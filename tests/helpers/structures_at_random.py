@@ -78,6 +78,13 @@ def reed_matrices(elements=20, length=0.12, width=0.02, height=0.003, modulus=21
     return mass, 2e-6 * stiffness + 1.0 * mass, stiffness
 
 
+def beam_matrices(elements, length, width, height, modulus=210e9, density=7850.0):
+    """M and K of a clamped beam, bent alone; of each node y across it and the rotation."""
+    mass, _, stiffness = reed_matrices(elements, length, width, height, modulus, density)
+    across = np.arange(len(mass)) % 3 != 0
+    return mass[np.ix_(across, across)], stiffness[np.ix_(across, across)]
+
+
 def reed(normal_force=100.0, body=None):
     """The reed's tip on a moving surface, at 60 degrees to it."""
     mass, damping, stiffness = reed_matrices()

@@ -34,7 +34,7 @@ SHRINK = 0.6  # factor between successive trial radii
 LONG = 30.0  # ratio of slip to all else, in natural sizes, above which a mode is scaled by all else
 SPREAD = (0.0, 0.25, 0.5)  # powers of the decay times' ratio by which fast modes are lessened in a third of directions
 INNER = (0.75, 0.5, 0.25, 0.1)  # radii of inner shells that are checked too, as shares of the ball's
-FEW = 8  # share of the directions in which levels are tried first
+FEW = 8  # share of the directions in which balls and levels are tried first
 MARGIN = 0.5  # required share of the linear decay of V
 
 
@@ -104,11 +104,19 @@ class Neighbourhood:
             found = np.linalg.norm(self.coordinates(which, states), axis=1)
         return np.asarray(np.where(np.isfinite(found), found, np.inf))
 
-    def holds(self, which: Array, states: Array) -> Array:
-        """True (k,) for states (k, n) of rigs `which` inside their balls, or where V has not reached its level."""
+    def holds(self, which: Array, states: Array, steps: Array | float = 0.0) -> Array:
+        """True (k,) for states (k, n) of rigs `which` inside their balls, or where V has not reached its level.
+
+        A level costs as much as about n⁴ integration steps. It is computed where several of the motions need it, or
+        where the `steps` (k,) that one has taken are as many; until then such a motion counts as outside.
+        """
         radius, away = self.computed(which), self.distance(which, states)
         inside = np.asarray(away < radius)
         left = np.flatnonzero(~inside & (away < REACH) & (radius > 0))
+        key = self.key[which[left]]
+        many = np.isin(key, [one for one, count in zip(*np.unique(key, return_counts=True), strict=True) if count > 1])
+        late = np.broadcast_to(steps, which.shape)[left] >= states.shape[1] ** 4
+        left = left[many | late | np.isin(key, list(self.levels))]
         if len(left):
             inside[left] = self._below(which[left], states[left])
         return inside
@@ -144,13 +152,15 @@ class Neighbourhood:
 
     def _radii(self, which: Array) -> Array:
         """Radii of the balls."""
-        around = self.around(which)
+        size, around = np.full(len(which), LARGEST), self.around(which)
+        for ways in (around[:, ::FEW], around):
 
-        def falls(some: Array, size: Array) -> Array:
-            q = around[some] * size[:, None, None]
-            return self._falls(which[some], q, 2 * q)
+            def falls(some: Array, size: Array, ways: Array = ways) -> Array:
+                q = ways[some] * size[:, None, None]
+                return self._falls(which[some], q, 2 * q)
 
-        return _largest(np.full(len(which), LARGEST), np.full(len(which), SMALLEST), falls)
+            size = _largest(size, np.full(len(which), SMALLEST), falls)
+        return size
 
     def _falls(self, which: Array, q: Array, gradient: Array) -> Array:
         """True (k,) where V falls at least `MARGIN` times as fast as |q|² does linearly, at all q (k, d, n)."""

@@ -192,7 +192,7 @@ class _Course:
         found[which] = _seen(runs, which, ended)
         running = np.flatnonzero(found[which] == OPEN)
         going = which[running]
-        found[going[runs.near.holds(going, state[going])]] = RETURNS
+        found[going[runs.near.holds(going, state[going], self.steps[going])]] = RETURNS
         neutral = runs.rest.neutral[going]
         found[going[neutral & (self.elapsed[going] >= self.most[going])]] = RETURNS
         if self.shells is not None:

@@ -86,15 +86,19 @@ class Rest:
 
     @property
     def natural_slip(self) -> Array:
-        """Natural length of a step of the load point, (m,)."""
+        """Natural length of a step of the load point, (m,); inf where it moves no body by a spring, as beneath one."""
         shifts = np.abs(in_columns(self.point.evaluate(_shifts(self.reduction)), len(self.velocity)))
         with np.errstate(divide="ignore"):
             return np.asarray(np.min(self.scales[:, list(self.places)] / shifts, axis=1))
 
     @property
     def time(self) -> Array:
-        """Natural time, s, (m,)."""
-        return np.asarray(self.natural_slip / np.abs(self.velocity))
+        """Natural time, s, (m,): in which the load point moves its natural length, or a body its own."""
+        by_load = self.natural_slip / np.abs(self.velocity)
+        if np.all(np.isfinite(by_load)):
+            return np.asarray(by_load)
+        by_body = np.min(self.scales[:, list(self.places)] / self.speeds, axis=1)
+        return np.asarray(np.where(np.isfinite(by_load), by_load, by_body))
 
     @property
     def contact(self) -> int:

@@ -61,8 +61,8 @@ class StepBudget:
 
     @classmethod
     def of(cls, steps: float, variables: int) -> StepBudget:
-        """Budget of `steps` for a slider; less for more variables, by the square of their number."""
-        return cls(steps * min(1.0, (USUAL / variables) ** 2))
+        """Budget of `steps` for a slider; less for more variables, by the cube of their number, as a step costs."""
+        return cls(steps * min(1.0, (USUAL / variables) ** 3))
 
 
 @dataclass(frozen=True, eq=False)

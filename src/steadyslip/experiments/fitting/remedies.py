@@ -122,7 +122,7 @@ def mended(plan: Plan, ssq: float, values: Mapping[str, float]) -> bool:
     size, samples = len(plan.space()), sum(map(len, plan.records))
     wanted = ssq * float(np.exp(-STRONG_EVIDENCE / samples))  # more is too little even in white noise
     for own in _changed(plan):
-        if not _choice(plan, own) or not _is_brief(own, values):
+        if not _choice(plan, own) or not _is_brief(own, values) or _lacks_memory(own, plan):
             continue
         try:
             best = _from_minimum(own, _effort(own), values, LAGS[:3], wanted)
@@ -198,6 +198,12 @@ def _recalls(own: Plan, base: Plan) -> bool:
     before, after = base.rig, own.rig
     states = len(after.of_kind("evolution effect")) > len(before.of_kind("evolution effect"))
     return before.friction.forgets_stress() and not after.friction.forgets_stress() and not states
+
+
+def _lacks_memory(own: Plan, base: Plan) -> bool:
+    """True if a plan's law is that of another without its memory of normal stress: it fits no better."""
+    law, whole = own.rig.friction, base.rig.friction
+    return law != whole and replace(law, **{name: getattr(whole, name) for name in whole.decided_by_stress}) == whole
 
 
 def _effort(own: Plan) -> Effort:

@@ -124,7 +124,7 @@ def fit_with_errors(
             search = replace(search, converged=True)
         else:  # curvature beside the minimum says nothing of errors
             covariance = np.diag(np.full(free, np.inf))
-    ssq, near = float(residuals @ residuals), z[None]
+    ssq, near = float(residuals @ residuals), np.empty((0, free))
     if search.converged:
         covariance, opened, near = along_valleys(plan, comparison, z, bounds, information, covariance)
         undetermined += opened

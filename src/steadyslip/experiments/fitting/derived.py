@@ -9,18 +9,18 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError
-from steadyslip.experiments.fitting.estimates import UNDETERMINED, Estimate
+from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import critical_stiffness
 from steadyslip.machine.slider import Slider
 
 DERIVED = ("a - b", "k_c", "k/k_c", "k/k_cal")
+TOGETHER = 0.1  # e-folds or natural sizes to which a number must be known: beyond, models with open directions curve
 SIZE = 0.01  # natural size of a - b, as of b
 LIKELY = 1.96  # standard deviations that the places stand for which fit as well: 95 %
-STEP = (
-    1e-2  # of a standard deviation and an e-fold at most, for slopes: far above rounding, and curvature is below 1e-2
-)
+STEP = 1e-2  # of a standard deviation, for slopes: far above rounding, and what is curved is that by less than 1e-2
+LARGEST = 1e-2  # e-folds of which a step is a share at most: errors along open directions are small differences
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,12 @@ class Minimum:
     @property
     def steps(self) -> Array:
         """Steps of coordinates (p,) for slopes, 0 where one is not determined."""
-        return STEP * np.where(np.isfinite(self.deviations), np.minimum(self.deviations, 1.0), 0.0)
+        return STEP * np.where(np.isfinite(self.deviations), np.minimum(self.deviations, LARGEST), 0.0)
 
     @property
     def lost(self) -> set[str]:
-        """Parameters that are not determined."""
-        pairs = zip(self.space.unknowns, self.deviations, strict=True)
-        return {one.parameter for one, deviation in pairs if not np.isfinite(deviation)}
+        """Parameters that are not determined, or of which rounding leaves nothing."""
+        return {one.parameter for one, step in zip(self.space.unknowns, self.steps, strict=True) if not step > 0}
 
 
 def derived_estimates(
@@ -150,8 +149,8 @@ def joint_errors(
     """Standard deviations (of logarithms, where positive) of numbers of which a parameter in `lost` has none, by name.
 
     ``a - b`` may be told where neither a nor b is, and then k_c where the slip distance is. An error reaches to the
-    number at each of the places `near` (m, p) that fit as well; numbers whose error would not count as determined are
-    left out. Names end with ``@1`` and so on.
+    number at each of the places `near` (m, p) that fit as well; numbers that are not known well are left out. Names end
+    with ``@1`` and so on.
     """
     found = {}
     for record, rig in enumerate(rigs):
@@ -166,7 +165,7 @@ def joint_errors(
             error = float(
                 np.hypot(_error(minimum, one, name), np.max(np.abs(_counted(one, place.values) - own)) / LIKELY)
             )
-            if error <= UNDETERMINED * (1.0 if one.logarithmic else SIZE):
+            if error <= TOGETHER * (1.0 if one.logarithmic else SIZE):
                 found[name] = error
     return found
 

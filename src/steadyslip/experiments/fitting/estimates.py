@@ -113,23 +113,27 @@ class Combination:
 def whole_covariance(information: Array, spread: Array) -> Array:
     """Covariance (p, p) of the coordinates, of those too that `combinations` leaves without an error.
 
-    Along directions of which the data tell nothing it goes as far as anybody believes.
+    Along directions of which the data tell little or nothing it goes as far as anybody believes: more would leave
+    rounding of what they tell.
     """
-    covariance, blind = _linear_covariance(information, spread)
-    for direction in blind:
-        covariance += MOST_REACH**2 * np.outer(direction, direction) / max(float(np.max(direction**2)), 1e-300)
-    return covariance
+    values, directions, known = _directions(information)
+    largest = np.max(np.abs(directions), axis=0)
+    with np.errstate(all="ignore"):
+        reach = np.sqrt(np.einsum("ij,ik,kj->j", directions, spread, directions)) / values * largest
+    told = known & (reach <= MOST_REACH)
+    inverse = directions[:, told] / values[told] @ directions[:, told].T
+    beyond = MOST_REACH * directions[:, ~told] / largest[~told]
+    return np.asarray(inverse @ spread @ inverse + beyond @ beyond.T)
 
 
-def _linear_covariance(information: Array, spread: Array) -> tuple[Array, Array]:
-    """Covariance (p, p) along what has an effect on the model, and the directions (m, p) of what has none."""
+def _directions(information: Array) -> tuple[Array, Array, Array]:
+    """Information (p,) on independent directions, these (p, p) in columns, and mask of those with an effect."""
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     insensitive = size <= DERIVATIVE_ROUNDING * max(float(size.max(initial=0.0)), 1e-300)
     scale = np.where(insensitive, 1.0, size)
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     known = values > EIGENVALUE_ROUNDING * max(float(values.max(initial=0.0)), 1e-300)
-    inverse = vectors[:, known] / values[known] @ vectors[:, known].T / np.outer(scale, scale)
-    return inverse @ spread @ inverse, (vectors[:, ~known] / scale[:, None]).T
+    return values, vectors / scale[:, None], known
 
 
 def combinations(information: Array, spread: Array, space: Space) -> tuple[Array, tuple[Combination, ...]]:
@@ -149,9 +153,11 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
         inf on the diagonal where a parameter is not determined.
     found : tuple of Combination
     """
-    covariance, blind = _linear_covariance(information, spread)
+    values, directions, known = _directions(information)
+    inverse = directions[:, known] / values[known] @ directions[:, known].T
+    covariance = inverse @ spread @ inverse
     found, undetermined = [], np.zeros(len(space), dtype=bool)
-    for direction in blind:
+    for direction in directions[:, ~known].T:
         lost = np.abs(direction) > 1e-3 * np.max(np.abs(direction))
         found.append(combination(direction, np.inf, space, lost))
         undetermined |= lost

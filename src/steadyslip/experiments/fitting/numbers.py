@@ -127,6 +127,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
     def _joint(self, minimum: Minimum, covariance: Array, near: Array) -> dict[str, float]:
         """Errors, by `minimum`, of what follows from parameters that have none in a covariance (p, p)."""
         rigs, lost = [part.rig for part in self.comparison.parts], replace(minimum, covariance=covariance).lost
+        near = np.vstack([minimum.coordinates, near])
         return joint_errors(minimum, rigs, self.plan.calibrated, lost, near) if lost else {}
 
     def with_memories(self) -> Self:
@@ -143,7 +144,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         equal = [one for one in rivals if one.remedy.gain < STRONG_EVIDENCE]
         equal = equal if len(equal) == len(rivals) else []
         covariance, found = opened(self.space, self.covariance, equal)
-        near = self.coordinates + np.array([np.zeros(len(self.space)), *(one.shift(self.space) for one in equal)])
+        near = self.coordinates + np.array([one.shift(self.space) for one in equal]).reshape(-1, len(self.space))
         same = replace(self, covariance=covariance, unidentified=self.unidentified + found,
                        joint=self._joint(self._minimum, covariance, near))  # fmt: skip
         same.__dict__["remedies"] = tuple(one.remedy for one in rivals)

@@ -65,7 +65,7 @@ def along_valleys(
     """
     valley = _valley(comparison, information, covariance)
     if valley is None:
-        return covariance, (), z[None]
+        return covariance, (), np.empty((0, len(z)))
     unit = _unit_of_rise(information, covariance, valley.held)
     reached, near = _reached(plan, comparison, z, bounds, valley, unit)
     known = np.isfinite(np.diag(covariance)) & (valley.share >= 0)

@@ -44,7 +44,11 @@ def body_of(end: Any) -> Any:
 
 
 def _is_structure(body: Mapping[str, Any]) -> bool:
-    return "structure" in (body.get("motion"), body.get("kind"))
+    """True for a raw table of a structure, also with the word misspelt or left out: that is told, not its points."""
+    named = body.get("motion", body.get("kind"))
+    if named is None:
+        return any(key in body for key in ("matrices", "modes", "response"))
+    return isinstance(named, str) and bool(get_close_matches(named, ["structure"]))
 
 
 def _points(

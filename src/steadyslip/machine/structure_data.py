@@ -92,8 +92,11 @@ class StructureData(Displayed):
         try:
             np.linalg.cholesky(even)
         except np.linalg.LinAlgError:
+            exchanged = "; it is larger than the stiffness: are M and K exchanged?"
             yield Problem(
-                "mass", "is not positive definite; allowed: inertia in every direction; condense massless coordinates"
+                "mass",
+                "is not positive definite; allowed: inertia in every direction; condense massless coordinates"
+                + (exchanged if largest > np.max(np.abs(self.stiffness)) else ""),
             )
 
     def _shape_problems(self) -> Iterator[Problem]:
@@ -118,6 +121,16 @@ class StructureData(Displayed):
     def size(self) -> int:
         """Number of degrees of freedom."""
         return len(self.mass)
+
+    def fastest_of_slow(self, least: float) -> float:
+        """Angular frequency of the fastest mode, rad/s, of a structure held in place; 0 where it is above `least`."""
+        from scipy.linalg import eigvalsh  # slow to import
+
+        stiff = 0.5 * (self.stiffness + self.stiffness.T)
+        if np.max(np.diag(stiff) / np.diag(self.mass)) > least**2:  # Rayleigh: no more than the fastest squared
+            return 0.0
+        squares = eigvalsh(stiff, self.mass)
+        return float(np.sqrt(squares[-1])) if squares[0] > 0 and squares[-1] < least**2 else 0.0
 
     @cached_property
     def digest(self) -> str:

@@ -17,7 +17,7 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.domains import line, nonnegative, real
 from steadyslip.core.entries import Whole
 from steadyslip.core.errors import ParameterError, Problem, QuantityError, repr_short
-from steadyslip.core.format import format_percent
+from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.names import Members
 from steadyslip.core.quantities import parse
 from steadyslip.core.records import FrozenRecord, members, parameter, setting
@@ -29,6 +29,7 @@ from steadyslip.machine.structure_data import StructureData, reduced_once
 _ONE = "give exactly one of matrices, modes and response"
 _DAMPED = 0.1  # damping ratio from which it is asked about: as percent most are above, as ratios nearly all below
 _FEEDING = 0.2  # share of frequencies at which a structure that loses energy may seem to feed it, by errors
+_SLOW = 0.2  # rad/s: towers and ships sway with .1 to 1 rad/s in the slowest of their modes, not in the fastest
 _SMALL = 1e-8  # share of the largest eigenvalue of a damping matrix that is taken for rounding of a file
 _UNITS = 'units of length, of mass or force, and of time, as in "mm t s" or "mm N s"'
 
@@ -234,6 +235,11 @@ class StructureBody(Body, name="structure"):
             own = np.linalg.eigvalsh(0.5 * (self.matrices.damping + self.matrices.damping.T))
             if own[0] < -_SMALL * np.max(np.abs(own)):
                 yield "matrices: the damping C feeds some motions (it has negative eigenvalues): is its sign right?"
+            if fastest := self.matrices.fastest_of_slow(_SLOW):
+                yield (
+                    f"matrices: the fastest of all modes turns once in {format_quantity(2 * np.pi / fastest, 's')}, "
+                    "slower than any structure: are M and K exchanged, or the unit of time another?"
+                )
         elif self.response is not None:
             wrong = {name: share for name, share in self.response.feeding().items() if share > _FEEDING}
             if wrong:

@@ -35,10 +35,10 @@ def _loaded(body: Any, folder: Path) -> Any:
     if not isinstance(body, dict):
         return body
     found, motion = dict(body), body.get("motion", body.get("kind"))
-    if motion == StructureBody.name:
+    if isinstance(motion, str):  # `kind` is the former name of the key
         found = {key: value for key, value in body.items() if key != "kind"} | {"motion": motion}
-    elif motion is not None or not _READERS.keys() & body.keys():
-        return body
+    if motion != StructureBody.name and (motion is not None or not _READERS.keys() & body.keys()):
+        return found
     for key, path in body.items():
         meant = _meant(key)
         more: tuple[Any, ...] = (found.get("averages", 1),) if meant == "response" else ()

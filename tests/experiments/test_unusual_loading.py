@@ -74,6 +74,18 @@ def test_changes_that_are_the_faults_own_are_none(seed):
     assert spring(record) == pytest.approx(lab.STIFFNESS, rel=0.01)
 
 
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(n, marks=pytest.mark.campaign) for n in range(2, 20))])
+def test_a_sensor_that_slips_is_told_from_the_fault(seed):
+    """A level that jumps after a step, and three wild samples, made 15 of 90 load points ones across the fault."""
+    chance = np.random.default_rng(seed)
+    found, _ = servo_record(seed, evolution=chance.choice([ss.laws.Slip(), ss.laws.Aging()]))
+    moved = found.displacement.copy()
+    moved[found.time > found.loading.load.changes[0].time + chance.uniform(1, 10)] += 0.8e-6 * chance.choice([-1, 1])
+    moved[chance.integers(0, len(moved), 3)] += chance.choice([-3e-6, 4e-6], 3)
+    columns = {name: getattr(found, name) for name in ("time", "friction", "normal")}
+    assert spring(ss.record_from_arrays(**columns, displacement=moved)) is None
+
+
 @pytest.mark.campaign
 def test_a_fit_says_that_it_cannot_show_a_servo():
     told = {across: str(ss.fit(ss.lab_rig(), measured(1e11, 2e-8, across))) for across in (True, False)}

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.experiments.loading.kinks import load_course
+from steadyslip.experiments.loading.kinks import load_course, slips_and_glitches
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.numerics.splitting import level_noise
 
@@ -46,10 +46,15 @@ def yielding(time: Array, displacement: Array, friction: Array, course: Course) 
     """
     if course.curve is not None or not course.strays > 0:
         return None
-    lost, together = _slope(time, displacement - course.integral(time), friction, course)
+    slips = np.empty((0, len(time)))
+    keep = np.ones(len(time), dtype=bool)
+    if course.slips or course.glitches or _is_late(course):
+        slips, keep = slips_and_glitches(time, displacement)
+    shown = _Shown(time[keep], displacement[keep], friction[keep], slips[:, keep])
+    lost, together = shown.slope(course)
     apart = together > WITH_FRICTION
     if apart:
-        lost = _with_fewer_changes(time, displacement, friction, course)
+        lost = shown.with_fewer_changes(course)
     if not lost > 0:
         return None
     found = course
@@ -57,7 +62,7 @@ def yielding(time: Array, displacement: Array, friction: Array, course: Course) 
         found = load_course(time, displacement + lost * friction)
         if found.curve is not None:
             break
-        lost, _ = _slope(time, displacement - found.integral(time), friction, found)
+        lost, _ = shown.slope(found)
     simple = found.curve is None and not _is_late(found) and len(found.changes) <= len(course.changes)
     return Yielding(lost, found) if lost > 0 and (simple or not apart) else None
 
@@ -67,57 +72,77 @@ def _is_late(course: Course) -> bool:
     return course.otherwise is not None or any(change.lag or change.pieces for change in course.changes)
 
 
-def _with_fewer_changes(time: Array, displacement: Array, friction: Array, course: Course) -> float:
-    """Displacement lost per friction (m) by which steps, as many as a course has or fewer, follow as well; 0 if none.
+@dataclass(frozen=True)
+class _Shown:
+    """What a sensor shows beside friction, where it has no glitch.
 
-    Two changes beside each other may be one at which friction has its peak.
+    Attributes
+    ----------
+    time, displacement, friction : ndarray (n,)
+    slips : ndarray (k, n)
+        1 after each sudden change of the sensor's level, 0 before it.
     """
-    times = np.array([change.time + change.lag for change in course.changes])
-    if not len(times) or (len(times) == 1 and not _is_late(course)):
+
+    time: Array
+    displacement: Array
+    friction: Array
+    slips: Array
+
+    def with_fewer_changes(self, course: Course) -> float:
+        """Displacement lost per friction (m) by which steps, as many as a course has or fewer, follow as well; or 0.
+
+        Two changes beside each other may be one at which friction has its peak.
+        """
+        times = np.array([change.time + change.lag for change in course.changes])
+        if not len(times) or (len(times) == 1 and not _is_late(course)):
+            return 0.0
+        off = self.displacement - (course.otherwise or course).integral(self.time)
+        own, noise = float(np.std(_beside(off, self.slips))), level_noise(self.friction)
+        while len(times):
+            lost, error, strays = self.steps_and_friction(times)
+            if strays <= AS_WELL * np.hypot(own, lost * noise) and lost > CERTAIN * error:
+                return lost
+            if len(times) == 1:
+                break
+            first = int(np.argmin(np.diff(times)))
+            times = np.concatenate([times[:first], [np.mean(times[first : first + 2])], times[first + 2 :]])
         return 0.0
-    best = course.otherwise or course
-    own, noise = float(np.std(displacement - best.integral(time))), level_noise(friction)
-    while len(times):
-        lost, error, strays = _steps_and_friction(time, displacement, friction, times)
-        if strays <= AS_WELL * np.hypot(own, lost * noise) and lost > CERTAIN * error:
-            return lost
-        if len(times) == 1:
-            break
-        first = int(np.argmin(np.diff(times)))
-        times = np.concatenate([times[:first], [np.mean(times[first : first + 2])], times[first + 2 :]])
-    return 0.0
+
+    def steps_and_friction(self, times: Array) -> tuple[float, float, float]:
+        """Displacement lost per friction (m), its error, and scatter about steps of rate near some times, and it."""
+        t, times = self.time - self.time[0], times - self.time[0]
+        rates = np.array([])
+        for last in [False] * STEPS_OF_TIMES + [True]:
+            since = np.maximum(t - times[:, None], 0.0)
+            jumps = [] if last else list(since > 0)  # a jump stands for a change that was earlier or later
+            rows = np.column_stack([np.ones_like(t), t, *since, -self.friction, *self.slips, *jumps])
+            found, *_ = np.linalg.lstsq(rows, self.displacement)
+            if not last:
+                rates, levels = found[2 : 2 + len(times)], found[len(found) - len(times) :]
+                with np.errstate(all="ignore"):
+                    times = np.clip(np.nan_to_num(times - levels / rates), t[1], t[-2])
+        off = self.displacement - rows @ found
+        scatter = float(np.std(off))
+        inverse = np.linalg.pinv(rows.T @ rows)
+        return float(found[2 + len(times)]), scatter * float(np.sqrt(inverse[2 + len(times), 2 + len(times)])), scatter
+
+    def slope(self, course: Course) -> tuple[float, float]:
+        """Displacement lost per friction (m) and correlation of both, less straight lines between changes of rate."""
+        both = np.stack([self.displacement - course.integral(self.time), self.friction])
+        edges = np.searchsorted(self.time, [-np.inf, *(change.time for change in course.changes), np.inf])
+        parts = [
+            np.stack([_beside(one, np.stack([self.time[own] - self.time[own][0], *self.slips[:, own]]))
+                      for one in both[:, own]])
+            for own in (slice(*pair) for pair in pairwise(edges))
+            if own.stop - own.start >= FEWEST
+        ]  # fmt: skip
+        moved, rose = np.hstack(parts) if parts else np.zeros((2, 1))
+        size = float(np.sqrt(np.sum(moved**2) * np.sum(rose**2)))
+        together = float(np.sum(moved * rose))
+        return (-together / float(np.sum(rose**2)), together / size) if size > 0 else (0.0, 0.0)
 
 
-def _steps_and_friction(time: Array, displacement: Array, friction: Array, times: Array) -> tuple[float, float, float]:
-    """Displacement lost per friction (m), its error, and scatter about steps of rate near given times and friction."""
-    t, times = time - time[0], times - time[0]
-    rates = np.array([])
-    for last in [False] * STEPS_OF_TIMES + [True]:
-        since = np.maximum(t - times[:, None], 0.0)
-        jumps = [] if last else list(since > 0)  # a jump stands for a change that was earlier or later
-        rows = np.column_stack([np.ones_like(t), t, *since, -friction, *jumps])
-        found, *_ = np.linalg.lstsq(rows, displacement)
-        if not last:
-            rates, levels = found[2 : 2 + len(times)], found[-len(times) :]
-            with np.errstate(all="ignore"):
-                times = np.clip(np.nan_to_num(times - levels / rates), t[1], t[-2])
-    off = displacement - rows @ found
-    scatter = float(np.std(off))
-    inverse = np.linalg.pinv(rows.T @ rows)
-    return float(found[2 + len(times)]), scatter * float(np.sqrt(inverse[2 + len(times), 2 + len(times)])), scatter
-
-
-def _slope(time: Array, strays: Array, friction: Array, course: Course) -> tuple[float, float]:
-    """Displacement lost per friction (m) and correlation of both, less a straight line between two changes of rate."""
-    both = np.stack([strays, friction])
-    edges = np.searchsorted(time, [-np.inf, *(change.time for change in course.changes), np.inf])
-    parts = []
-    for first, last in pairwise(edges):
-        if last - first >= FEWEST:
-            line = np.column_stack([np.ones(last - first), time[first:last] - time[first]])
-            own = both[:, first:last]
-            parts.append(own - (line @ np.linalg.lstsq(line, own.T, rcond=None)[0]).T)
-    moved, rose = np.hstack(parts) if parts else np.zeros((2, 1))
-    size = float(np.sqrt(np.sum(moved**2) * np.sum(rose**2)))
-    together = float(np.sum(moved * rose))
-    return (-together / float(np.sum(rose**2)), together / size) if size > 0 else (0.0, 0.0)
+def _beside(values: Array, rows: Array) -> Array:
+    """What of values (n,) a constant and rows (k, n) leave."""
+    columns = np.column_stack([np.ones_like(values), *rows])
+    return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0])

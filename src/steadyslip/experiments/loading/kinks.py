@@ -33,6 +33,7 @@ ENOUGH_SAMPLES = 30  # samples that determine their own noise; chosen by trial
 BRIEF_RUN = 0.3  # share of a run beside it that a run lasts which may be a part of a servo's response; by trial
 MOST_BRIEF = 4  # such runs that are left out, the shortest first: more would be too many for one record
 LAG_ERROR = 0.1  # of a servo, relative, by which the time of its command is uncertain too
+SUDDEN = 5  # samples that a glitch of the sensor lasts at most, and on either side of a slip that show most of it
 LASTING = 2.0  # samples per independent sample from which correlation is taken into account where runs are found
 EXACTLY = 1e-9  # share of a column's range below which deviations are rounding
 EXACT = 1e-2  # error of a time in sampling intervals below which it is not fitted
@@ -165,6 +166,24 @@ def _as_lines(time: Array, runs: list[Run]) -> Kinks:
         if 1 < other[0] - one[1] < min(one[1] - one[0], other[1] - other[0])  # a late response begins or ends a run
     ]
     return Kinks(np.array(meets), np.zeros(len(meets)), np.array(levels), float(reach), glitches)
+
+
+def slips_and_glitches(time: Array, displacement: Array) -> tuple[Array, Array]:
+    """Sudden changes of a sensor's level within runs: rows (k, n) of 1 after each; and mask (n,) without glitches.
+
+    What takes many samples is not the sensor's: where friction has its peak, the machine yields.
+    """
+    runs = straight_runs(time, displacement)
+    slips, keep = [], np.ones(len(time), dtype=bool)
+    for run in runs:
+        off = displacement - run.rate * time
+        for (one, other), (group, after) in zip(pairwise(run.members), pairwise(run.groups), strict=True):
+            at_once = np.median(off[other[0] : other[0] + SUDDEN]) - np.median(off[one[1] - SUDDEN : one[1]])
+            if group != after and at_once / (run.levels[after] - run.levels[group]) > 0.5:
+                slips.append(np.arange(len(time)) >= other[0])
+            if other[0] - one[1] <= SUDDEN:
+                keep[one[1] : other[0]] = False
+    return np.array(slips, dtype=float).reshape(-1, len(time)), keep
 
 
 def _piecewise_linear(runs: list[Run], time: Array) -> bool:

@@ -106,10 +106,11 @@ class SolutionCurve:
             If it does not converge, or only farther than `reach` from the guess: on something else.
         """
         across = self.weights * tangent
-        u, before, contraction, close = guess.copy(), np.inf, 0.0, self.residuals is None
+        u, before, contraction, close, solved = guess.copy(), np.inf, 0.0, self.residuals is None, -1
         for iteration in range(MOST_ITERATIONS):
             if not close:
                 u, before, close = self._approached(u, before, guess, across, ASIDE * reach)
+                solved = iteration if close else solved
                 if close and self.size(u - guess) > reach:
                     raise Failure("the equations lead elsewhere")
             residual, jacobian = self.equations(u)
@@ -125,9 +126,9 @@ class SolutionCurve:
             size = self._largest(step, u)
             contraction = size / (before + NEARLY) if iteration == 1 else contraction
             # solved by residuals, from which these differ by errors of evaluation
-            known = before <= self.tolerance and size <= NEARLY and np.max(np.abs(residual)) <= ALIKE
+            known = iteration == solved and size <= NEARLY and np.max(np.abs(residual)) <= ALIKE
             u = u if known else u - step
-            size = before if known else size
+            size = min(before, self.tolerance) if known else size
             standing = size > 0.3 * before
             rounded = standing and iteration > 2 and size <= self.rounding
             converged = size <= self.tolerance or (size < 10 * self.tolerance and standing) or rounded
@@ -170,7 +171,7 @@ class SolutionCurve:
                 change = inverse @ (now - left)
                 inverse += np.outer(step - change, step @ inverse) / (step @ change)
                 left = now
-        return (u, size, False) if size < NEARLY else (start, moved, False)
+        return (u, size, size <= 10 * self.tolerance) if size < NEARLY else (start, moved, False)
 
     @staticmethod
     def _largest(step: Array, u: Array) -> float:

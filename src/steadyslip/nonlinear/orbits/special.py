@@ -9,7 +9,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.nonlinear.continuation import Failure, Point
-from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
+from steadyslip.nonlinear.orbits.cycle import UNCERTAIN, Cycle, SpecialCycle
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 NOISE = 3e-9  # relative difference of parameter values below which they agree within rounding, near the onset
@@ -18,7 +18,7 @@ BLURRED = 10.0  # factor from the last Newton step to the uncertainty of the par
 ROUNDING = 1e-11  # relative difference of parameter values that is rounding anywhere
 FOLDED = 0.9  # growth below which a fold is rejected: at a true fold a multiplier is 1
 REAL = 1e-3  # largest relative imaginary part of a multiplier that counts as real: two that have just met differ by it
-LEVEL = 3e-6  # slope of the parameter that is zero at a fold: the parameter is off by the square of it
+LEVEL = 0.03  # slope of the parameter that is zero at a fold, in roots of rtol: the parameter is off by its square
 FLAT = (
     0.4  # slope of the parameter in the middle of a step, as a share of their mean at its ends, below which it may turn
 )
@@ -143,7 +143,7 @@ def _located(
     def beyond_error(point: Point, trivial: float, others: Array) -> float:
         """Value of the test function, zero where it is below the error of the multipliers."""
         value = float(point.tangent[-1]) if measure is None else measure(others)
-        error = LEVEL if measure is None else abs(trivial - 1)
+        error = LEVEL * np.sqrt(shooting.flow.options.rtol) if measure is None else UNCERTAIN * abs(trivial - 1)
         values[point.length] = value, error
         return value if abs(value) > error else 0.0
 

@@ -5,6 +5,7 @@ import pytest
 
 import steadyslip as ss
 from lab_records import STEP, STIFFNESS, TRUTH, columns, record, rig, stepped, two_states
+from steadyslip.experiments.fitting.estimates import whole_covariance
 
 TRUE_LEVEL = -0.0035
 
@@ -54,6 +55,16 @@ def test_steady_sliding_tells_a_minus_b_where_samples_miss_the_transient(b, seed
     assert "  a - b  " in str(fit)
     fit.save(tmp_path / "fit.nc")
     assert ss.load_fit(tmp_path / "fit.nc").derived == fit.derived
+
+
+def test_directions_of_which_data_tell_nothing_leave_what_the_others_tell():
+    """The difference of two unknowns with an error of .001, their sum with next to no information."""
+    along, across = np.array([1.0, 1.0]) / np.sqrt(2), np.array([1.0, -1.0]) / np.sqrt(2)
+    for little in (0.0, 1e-12, 1e-6, 1e-2):
+        information = 1e6 * np.outer(across, across) + little * np.outer(along, along)
+        found = whole_covariance(information, information)
+        assert across @ found @ across == pytest.approx(1e-6, rel=1e-9)
+        assert np.max(np.sqrt(np.diag(found))) == pytest.approx(2.0, rel=1e-6)  # nobody believes further
 
 
 @pytest.mark.campaign

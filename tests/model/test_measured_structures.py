@@ -315,3 +315,20 @@ def test_files_that_hold_no_response_are_refused(tmp_path, name, content, said):
     with pytest.raises(ss.RigFileError, match=said) as error:
         read(tmp_path, name)
     assert "bodies.reed.response" in str(error.value)
+
+
+def test_what_needs_equations_names_what_a_measured_response_answers():
+    """One sentence from all functions; `cycles` and `hopf` sought edges first, for minutes."""
+    body = StructureBody(response=reed_response(2 * np.pi * np.arange(1.0, 50.0)), points={"tip": StructurePoint()})
+    machine = Machine(bodies={"reed": body}, contacts=dict(reed().contacts), drive=reed().drive)
+    along = {"along": "contacts.tip.friction.b"}
+    asked = [ss.stability, ss.linear.modes, ss.eigenvalues, ss.threshold, ss.simulate]
+    asked += [lambda rig: ss.hopf(rig, **along), lambda rig: ss.cycles(rig, **along)]
+    for function in asked:
+        with pytest.raises(ss.NotAvailable, match=r"`analyze` tells its verdict .* identified_modes its modes"):
+            function(machine)
+
+
+def test_a_figure_of_sliders_refuses_machines_in_words():
+    with pytest.raises(ss.ParameterError, match="allowed: a Slider"):
+        ss.figures.critical_stiffness_against_mass(reed())

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.options import checked
 from steadyslip.core.palette import BLACK, CURVES, LINES
 from steadyslip.figures.style import axes_or_new, axis_label
 from steadyslip.laws.contact import InclinedSpring
@@ -24,6 +25,7 @@ _MIN_MASS = 1e-12  # lowest m* searched: stands for a quasistatic rig
 _CROSSING_TOLERANCE = 1e-6  # largest relative spread of the curves of all angles that counts as one crossing point
 
 
+@checked()
 def critical_stiffness_against_mass(
     rig: Slider, angles: Sequence[float] | None = None, m_star: Any = None, ax: Axes | None = None
 ) -> Axes:

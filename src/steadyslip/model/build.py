@@ -22,13 +22,9 @@ from steadyslip.machine.slider import Slider
 from steadyslip.machine.structure_elements import with_elements
 from steadyslip.model.assembly import assemble
 from steadyslip.model.equations import MOVED, Model
-from steadyslip.model.numeric import has_response
+from steadyslip.model.numeric import refuse_response
 from steadyslip.model.numeric.machine_matrices import NO_PULL
 
-MEASURED = (
-    "a structure given by its measured response has no equations; analyze, boundary and margins are offered. Describe "
-    "it by matrices or modes for more"
-)
 HELD = (
     "the drive holds a place (velocity = 0), so there is no steady sliding to be stable or not: linear stability does "
     "not speak of hunting, and a loaded bristle at rest has no linearisation; ask `steadyslip hunt`, "
@@ -85,8 +81,7 @@ def model_of(rig: Rig, present: Iterable[str] = (), drive: str = MOVED) -> Model
     """Build the Model without checks; `drive` is `MOVED`, `PULLED` or `EITHER`."""
     if rig.holds:
         raise NotAvailable(HELD)
-    if has_response(rig):
-        raise NotAvailable(MEASURED)
+    refuse_response(rig)
     kept = frozenset(present)
     key = (shape_of(rig), kept, drive, *((name, rig.value(name)) for name in in_matrices(rig)))
     return _build_cached(_Structure(key, rig, kept, drive), 0)

@@ -7,12 +7,17 @@ from __future__ import annotations
 
 from typing import TypeGuard
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 
 _WRITTEN_OUT = 18
 """States, each of first order, up to which the polynomial of a machine is written out in symbols within some ten
 seconds: 8 blocks in a row with one contact have 17, and with 9 the time doubles for each block more."""
+MEASURED = (
+    "a structure given by its measured response has no equations; `analyze` tells its verdict and edges, in Python "
+    "also boundary and margins, and identified_modes its modes. Describe it by matrices or modes for more"
+)
 
 
 def has_structure(rig: Rig) -> bool:
@@ -23,6 +28,12 @@ def has_structure(rig: Rig) -> bool:
 def has_response(rig: Rig) -> bool:
     """True for a machine with a structure given by its measured response, which has no eigenvalues to be computed."""
     return any(getattr(body, "response", None) is not None for body in rig.bodies.values())
+
+
+def refuse_response(rig: Rig) -> None:
+    """Raise NotAvailable for a machine with a structure given by its measured response: it has no equations."""
+    if has_response(rig):
+        raise NotAvailable(MEASURED)
 
 
 def by_matrices(rig: Rig) -> TypeGuard[Machine]:

@@ -15,7 +15,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import with_values
 from steadyslip.machine.machine import Machine
-from steadyslip.model.numeric import has_response
+from steadyslip.model.numeric import refuse_response
 from steadyslip.model.numeric.balance import Balance, balances
 from steadyslip.model.numeric.machine_matrices import MachineMatrices, VariedMachine, assemble
 from steadyslip.model.numeric.measured import MeasuredMachine
@@ -135,11 +135,7 @@ def machine_point(machine: Machine) -> MachinePoint:
     NotAvailable
         If it has a structure given by its measured response.
     """
-    if has_response(machine):
-        raise NotAvailable(
-            "a structure given by its measured response has no equations; analyze, boundary and margins are offered. "
-            "Describe it by matrices or modes for more"
-        )
+    refuse_response(machine)
     found: MachinePoint = _point(machine)
     return found
 

@@ -34,6 +34,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.eigenvalues import eigenvalues_of
 from steadyslip.model.linearisation import is_written_out
+from steadyslip.model.numeric import refuse_response
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.posed import spare_powers
 from steadyslip.model.range import quasipolynomial, require_range
@@ -212,6 +213,7 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
     >>> onset.kind, round(onset.value / 1e9, 3)
     ('supercritical', 29.07)
     """
+    refuse_response(rig)
     name = rig.parameter_along(along)
     edges = [edge for edge in boundary(rig, name, branch=branch) if edge.stable != "neither"]
     oscillatory = [edge for edge in edges if edge.kind == "oscillatory"]

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 import lab_records as lab
 import steadyslip as ss
+from steadyslip.experiments.fitting import remedies
 from steadyslip.experiments.fitting.at_minimum import fit_with_errors
 from steadyslip.experiments.fitting.remedies import Remedy
 from steadyslip.experiments.fitting.result import Fit
@@ -143,6 +144,46 @@ def test_models_that_nearly_tie_are_both_named(ahead, told):
     said = " ".join(str(fit).split())
     assert "with friction.evolution = 'prz' the sum of squares" in said
     assert (f"hardly told from that: friction.evolution = 'aging' (BIC {ahead:.1f} more, a +" in said) is told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("errors", "told"), [(0.9, "move by less than their errors"), (1.1, "do not use the values")])
+def test_a_model_that_moves_a_less_b_is_told_so(errors, told):
+    """It may, where it moves neither a nor b by its error: that of a - b is far smaller."""
+    fit = replace(lab.stepped())
+    level = fit["a - b"].value + errors * fit["a - b"].error
+    other = Remedy("fit.states = 2", 0.5 * fit.ssq, 40.0, 0.4, fit.values | {"a - b": level})
+    fit.__dict__["remedies"] = (other,)
+    said = " ".join(str(fit).split())
+    assert f"a - b {level:.2g} in place of {fit['a - b'].value:.2g}" in said
+    assert told in said
+
+
+@pytest.mark.slow
+def test_no_memory_is_passed_over(monkeypatch):
+    """The first that left no structure ended the trials: a record may speak for another by more."""
+    tried = []
+
+    def mended(own, plan, ssq, size, values, share):
+        choice = remedies._choice(plan, own)
+        tried.append((choice, share))
+        gain = 40.0 if "memory" in choice else 0.0
+        return Remedy(choice, 0.5 * ssq, gain, 0.4, dict(values))
+
+    monkeypatch.setattr(remedies, "_fitted", mended)
+    found = noisy(lab.columns(lab.rig(ss.laws.Aging(), alpha=0.3), lab.PRESSED, count=1800))
+    fitted(found)
+    for form in ("", "friction.evolution = 'aging', "):
+        for memory in ("linker-dieterich", "prakash-clifton"):
+            assert (f"{form}friction.normal_memory = '{memory}'", remedies.MEMORY_EFFORT) in tried
+
+
+@pytest.mark.slow
+def test_a_memory_needs_a_change_of_the_normal_stress():
+    fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), ss.record_from_arrays(**noisy(stepped())))
+    assert "without a change of the normal stress nothing tells friction.normal_memory.alpha" in " ".join(
+        str(fit).split()
+    )
 
 
 def test_what_nothing_mends_is_told():

@@ -22,7 +22,7 @@ from steadyslip.experiments.fitting.loading_words import loading_warnings, own_r
 from steadyslip.experiments.fitting.memories import forgets_changes
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import RampFit, may_be_ramp
-from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, WEAKENING, Remedy, weakening
 from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.loading.servo import overshoot
@@ -251,7 +251,11 @@ def _consequence(fit: FitNumbers, best: Remedy) -> str:
     """What a better model means for the values: whether it moves one by more than its error, or gives one none."""
     steep = _steep_names(fit.rig(0))
     shared = [n for n in steep if n in best.values and n in fit.values]
-    near = shared and all(abs(best.values[n] - fit.values[n]) <= fit.errors[n] < np.inf for n in shared)
+    shifts = [(best.values[n] - fit.values[n], fit.errors[n]) for n in shared]
+    if WEAKENING in best.values:
+        shifts += [(best.values[WEAKENING] - one.value, one.error) for one in fit.derived[:1]
+                   if one.name.partition("@")[0] == WEAKENING]  # fmt: skip
+    near = shifts and all(abs(shift) <= error < np.inf for shift, error in shifts)
     return "the values above move by less than their errors;" if near else "do not use the values above, but"
 
 
@@ -261,13 +265,22 @@ def _asked(fit: FitNumbers, one: Remedy) -> str:
     units |= {"lag": "s"}
     added = []
     for n, x in one.values.items():
-        if n not in fit.values and not n.startswith(("step.", "jump.")):
+        if n not in fit.values and n != WEAKENING and not n.startswith(("step.", "jump.")):
             unit = units.get(n.partition("@")[0].rpartition(".")[2], "1")
             added.append(f"{n.removeprefix('friction.')} {format_quantity(x, unit, 3)}")
     return f"{one.choice} ({', '.join(added)})" if added else one.choice
 
 
 def _moved(fit: FitNumbers, one: Remedy) -> list[str]:
+    """Relative changes of the parameters of the law and of the stiffness, and a − b beside that of the fit."""
+    own = weakening(fit.rig(0), fit.values)
+    levels = [] if own is None or WEAKENING not in one.values else [
+        f"{WEAKENING} {one.values[WEAKENING]:.2g} in place of {own:.2g}"
+    ]  # fmt: skip
+    return [*_shares(fit, one), *levels]
+
+
+def _shares(fit: FitNumbers, one: Remedy) -> list[str]:
     """Relative changes of the parameters of the law and of the stiffness."""
     return [f"{_symbol(n)} {one.values[n] / fit.values[n] - 1:+.0%}" for n in _steep_names(fit.rig(0))
             if n in one.values and fit.values.get(n)]  # fmt: skip
@@ -277,14 +290,14 @@ def _equal_memories(fit: FitNumbers) -> str:
     """Clause on the memories of normal stress with which the fit is as good, of a law that has none."""
     if not fit.remedies:
         return "residuals are noise, and with the memories that were tried the fit is worse, which speaks for none"
-    before = _weakening(fit, fit.values)
-    best = max(fit.remedies, key=lambda one: abs(_weakening(fit, one.values) - before))
-    after = _weakening(fit, best.values)
+    before = weakening(fit.rig(0), fit.values) or 0.0
+    best = max(fit.remedies, key=lambda one: abs(one.values.get(WEAKENING, before) - before))
+    after = best.values.get(WEAKENING, before)
     sign = ", so that not even its sign is determined" if before * after < 0 else ""
     taken = "it takes that to be none; " if forgets_changes(fit.plan) else ""
     return (
         f"{taken}the record is fitted as well with {_asked(fit, best)}, where a - b is {after:.2g} "
-        f"in place of {before:.2g}{sign}, {', '.join(_moved(fit, best))}; ask for that with --set (lab_rig in Python)"
+        f"in place of {before:.2g}{sign}, {', '.join(_shares(fit, best))}; ask for that with --set (lab_rig in Python)"
     )
 
 
@@ -293,20 +306,15 @@ def _open_memory(fit: FitNumbers) -> list[str]:
     lost = {name for one in fit.unidentified for name in one.weights if "normal_memory." in name}
     if not lost:
         return []
+    if not any(record.stress_changes for record in fit.plan.records):
+        return [
+            f"without a change of the normal stress nothing tells {enumerated(sorted(lost))}: leave the memory out, "
+            "give (fix) what is known of it, or fit a record with steps of the normal stress of the same rock along"
+        ]
     return [
         f"changes of normal stress alone do not tell {enumerated(sorted(lost))} from the rest of the law: fit a record "
         "with steps of velocity of the same rock along, or give (fix) what is known of the memory"
     ]
-
-
-def _weakening(fit: FitNumbers, values: dict[str, float]) -> float:
-    """a − b (a less all b) of the first record, from the values of unknowns."""
-    rig = fit.rig(0)
-    gain, loss = (
-        sum(values.get(n, values.get(f"{n}@1", rig.value(n) or 0.0)) for n in rig.of_kind(kind))
-        for kind in ("direct effect", "evolution effect")
-    )
-    return float(gain - loss)
 
 
 def _drained_at_once(fit: FitNumbers) -> list[str]:

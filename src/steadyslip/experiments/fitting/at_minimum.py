@@ -17,7 +17,7 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.search import SearchSummary, times_of_changes
 from steadyslip.experiments.fitting.valleys import along_open, along_valleys
 from steadyslip.experiments.loading.loading import raised, shifted
-from steadyslip.experiments.numerics.noise import Noise, describe, white
+from steadyslip.experiments.numerics.noise import STRUCTURE, Noise, describe, white, whiteness
 
 ARRIVED = 0.1  # standard deviations from the minimum, by the next step, within which a search that ended has arrived
 F = TypeVar("F", bound=Fitted)
@@ -100,7 +100,10 @@ def fit_with_errors(
     made: type[F], plan: Any, comparison: Any, z: Array, search: SearchSummary, errors: str,
     bounds: tuple[Array, Array],
 ) -> F:  # fmt: skip
-    """Fit of the class `made` at the coordinates (p,) of a minimum, with errors, noise and what is not determined."""
+    """Fit of the class `made` at the coordinates (p,) of a minimum, with errors, noise and what is not determined.
+
+    No errors where few of many starts lead to it and structure is left in the residuals: a better one may be missed.
+    """
     r, jacobian = comparison.residuals(z[None])
     residuals, rows = r[0], jacobian[0]
     free = len(z)
@@ -119,8 +122,12 @@ def fit_with_errors(
     counted = np.maximum(np.diag(information), 1e-300)
     scale = np.diag(spread) / counted  # variance of the data, as information on each unknown counts it
     covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
-    if not search.converged:
-        if _is_minimum(comparison, z, bounds, information, rows @ residuals, np.sqrt(np.diag(covariance))):
+    doubted = search.is_chance and whiteness(residuals[where] for where in comparison.slices).p < STRUCTURE
+    if doubted or not search.converged:
+        search = replace(search, converged=False)
+        if not doubted and _is_minimum(
+            comparison, z, bounds, information, rows @ residuals, np.sqrt(np.diag(covariance))
+        ):
             search = replace(search, converged=True)
         else:  # curvature beside the minimum says nothing of errors
             covariance = np.diag(np.full(free, np.inf))

@@ -281,5 +281,6 @@ def refit_from(result: Fit, others: Sequence[Fit]) -> Fit:
         return result
     found, _ = with_states_sorted(comparison, ends)
     errors = "correlated" if result.correlated else "independent"
-    search = replace(result.search, arrived=1, iterations=int(ends.iterations[0]), converged=bool(ends.converged[0]))
+    search = replace(result.search, starts=1, arrived=1, iterations=int(ends.iterations[0]),
+                     converged=bool(ends.converged[0]))  # fmt: skip
     return fit_with_errors(Fit, plan, comparison, found, search, errors, result.bounds)

@@ -114,8 +114,8 @@ class Fitted(ReadOnly):
         """
         if not self.search.converged:
             raise NotAvailable(
-                "the search of this fit had not come to its end, so that nothing is known of its errors; let it search "
-                "longer (effort), or fit another model"
+                "the search of this fit had not come to its end, or too few of its starts lead there, so that nothing "
+                "is known of its errors; let it search longer (effort, starts), or fit another model"
             )
 
     def _reach(self, level: float) -> float:

@@ -26,7 +26,7 @@ def quality(fit: Fitted) -> list[str]:
     reached = f"{search.arrived} of {search.starts} starts lead here"
     enough = min(MIN_ARRIVED, search.starts)
     reached += (
-        f", {enough} are enough" if search.arrived >= enough
+        f", {enough} are enough" if not search.is_chance
         else f", fewer than {enough}: there may be a better one, look with more (starts)"
     )  # fmt: skip
     if search.others:
@@ -54,6 +54,12 @@ def fitted_warnings(fit: Fitted) -> list[str]:
     found = [str(one) for one in fit.unidentified]
     if fit.search.cut:
         found.append(_cut_off(fit))
+    elif not fit.search.converged and fit.search.is_chance:
+        found.append(
+            f"{fit.search.arrived} of {fit.search.starts} starts lead to this minimum, and structure is left in the "
+            "residuals: there may be a better one, so that the numbers have no errors; look with more (starts), or fit "
+            "another model"
+        )
     elif not fit.search.converged:
         found.append("the search had not come to its end: the numbers are rough, and have no errors")
     close = [ratio for ratio in fit.search.others if ratio < 1.05]

@@ -75,6 +75,11 @@ class SearchSummary:
     converged: bool
     cut: bool = False
 
+    @property
+    def is_chance(self) -> bool:
+        """True if fewer starts than are enough lead to the best minimum."""
+        return self.arrived < min(MIN_ARRIVED, self.starts)
+
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:

@@ -18,6 +18,7 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.roles import Parameter
 from steadyslip.linear.allowance import at_most
 from steadyslip.linear.coupling import search_for
+from steadyslip.linear.matrix_coupling import search_matrices
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.matrix_search import MatrixSearch
 from steadyslip.linear.measured_search import MeasuredSearch
@@ -152,7 +153,7 @@ def _matrix_search(rig: Machine, name: str) -> MatrixSearch | MeasuredSearch:
     if has_response(rig):
         return MeasuredSearch(rig, name)
     require_matrices(rig)
-    return MatrixSearch(rig, name)
+    return search_matrices(rig, name)
 
 
 def _unknown(rig: Rig, search: Search | MatrixSearch | MeasuredSearch, low: float, high: float) -> str:

@@ -8,25 +8,46 @@ beyond it rises as the square root of the distance, from zero.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from steadyslip.linear.roots import Array
+from steadyslip.linear.roots import Array, ComplexArray
 from steadyslip.linear.search import SPLIT, Boundary, Search
 from steadyslip.linear.status import ABSENT, UNKNOWN, status
 from steadyslip.linear.undamped import grows, is_undamped, squares
 from steadyslip.machine.rig import Rig
-from steadyslip.model.point import OperatingPoint
 
 QUIET, GROWS = 10, 11  # beside the values of `status`
 ROUNDS = 4  # of following dips of the gap between two roots: each narrows it 16 times
 
 
-def _gap(point: OperatingPoint) -> Array:
-    """Least distance of two roots in s², relative to their size, (...); inf with one root."""
-    u = squares(point)
-    apart = np.abs(u[..., 1:] - u[..., :-1]) / np.abs(u[..., 1:] + u[..., :-1])  # they are sorted
+def gaps(u: ComplexArray) -> Array:
+    """Least distance of two of the sorted squares (..., n) of roots, relative to their size, (...); inf with one."""
+    apart = np.abs(u[..., 1:] - u[..., :-1]) / np.abs(u[..., 1:] + u[..., :-1])
     return np.asarray(np.min(np.where(np.isnan(apart), np.inf, apart), axis=-1, initial=np.inf))
+
+
+def near_couplings(grid: Array, gaps_at: Callable[[Array], Array]) -> Array:
+    """Values between samples at which two squares of roots come closest, where a narrow window may lie."""
+    gap = gaps_at(grid)
+    dips = np.flatnonzero((gap[1:-1] <= gap[:-2]) & (gap[1:-1] <= gap[2:]) & np.isfinite(gap[1:-1])) + 1
+    low, high, found = grid[dips - 1], grid[dips + 1], [np.empty(0)]
+    for _ in range(ROUNDS if dips.size else 0):
+        x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, SPLIT + 1)
+        best = np.clip(np.argmin(gaps_at(x.ravel()).reshape(x.shape), axis=1), 1, SPLIT - 1)
+        row = np.arange(len(low))
+        found.append(x[row, best])
+        low, high = x[row, best - 1], x[row, best + 1]
+    return np.concatenate(found)
+
+
+def meeting(u: ComplexArray) -> tuple[str, float]:
+    """Kind and frequency (rad/s) of an edge with squares of roots `u` beside it: two meet, or one passes zero."""
+    growing = u[np.isfinite(u) & ((u.imag != 0) | (u.real > 0))]
+    paired = growing[growing.imag != 0]
+    return ("coupling", float(np.sqrt(-paired.real.mean()))) if paired.size else ("divergence", 0.0)
 
 
 class UndampedSearch(Search):
@@ -35,8 +56,9 @@ class UndampedSearch(Search):
     def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
         with np.errstate(all="ignore"):
             low, high = self.searched if between is None else between
-            grid, point = self._usual if between is None else self._asked(between)
-            x = np.unique(np.concatenate([grid, self._near_couplings(grid, point)]))
+            grid = (self._usual if between is None else self._asked(between))[0]
+            narrow = near_couplings(grid, lambda values: gaps(squares(self.values(values))))
+            x = np.unique(np.concatenate([grid, narrow]))
             kind = self._kinds_of_growth(x)
             at = np.flatnonzero((kind[1:] != kind[:-1]) & (kind[1:] != UNKNOWN) & (kind[:-1] != UNKNOWN))
             found = [self._edge(x[i], x[i + 1], kind[i], kind[i + 1]) for i in at]
@@ -50,19 +72,6 @@ class UndampedSearch(Search):
         known = (found != ABSENT) & (found != UNKNOWN)
         return np.where(known, np.where(grows(point), GROWS, QUIET), found)
 
-    def _near_couplings(self, grid: Array, point: OperatingPoint) -> Array:
-        """Values between samples at which two roots in s² come closest, where a narrow window may lie."""
-        gap = _gap(point)
-        dips = np.flatnonzero((gap[1:-1] <= gap[:-2]) & (gap[1:-1] <= gap[2:]) & np.isfinite(gap[1:-1])) + 1
-        low, high, found = grid[dips - 1], grid[dips + 1], [np.empty(0)]
-        for _ in range(ROUNDS if dips.size else 0):
-            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, SPLIT + 1)
-            best = np.clip(np.argmin(_gap(self.values(x.ravel())).reshape(x.shape), axis=1), 1, SPLIT - 1)
-            row = np.arange(len(low))
-            found.append(x[row, best])
-            low, high = x[row, best - 1], x[row, best + 1]
-        return np.concatenate(found)
-
     def _edge(self, low: float, high: float, below: int, above: int) -> Boundary:
         absent = low if below == ABSENT else high  # a sample, where absence is no matter of rounding
         for _ in range(int(60 / np.log2(SPLIT))):  # bits of a float, and some to spare
@@ -74,19 +83,12 @@ class UndampedSearch(Search):
             lost = self._why_none(absent)
             kind, frequency, contact = lost.condition, 0.0, lost.contact
         else:
-            kind, frequency, contact = *self._meeting(low, high), ""
+            kind, frequency, contact = *meeting(squares(self.values(np.array([low, high])))), ""
         middle = 0.0 if low <= 0 <= high else low + 0.5 * (high - low)
         return Boundary(
             self.name, middle, (low, high), kind, frequency, "neither", self.role.unit,
             self.rig.printed_area(self.name), contact, quiet,
         )  # fmt: skip
-
-    def _meeting(self, low: float, high: float) -> tuple[str, float]:
-        """Kind and frequency (rad/s) of an edge: two roots in s² meet, or one passes zero."""
-        u = squares(self.values(np.array([low, high])))
-        growing = u[np.isfinite(u) & ((u.imag != 0) | (u.real > 0))]
-        paired = growing[growing.imag != 0]
-        return ("coupling", float(np.sqrt(-paired.real.mean()))) if paired.size else ("divergence", 0.0)
 
 
 def search_for(rig: Rig, name: str, present: tuple[str, ...], branch: int) -> Search:

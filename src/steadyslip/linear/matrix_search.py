@@ -32,7 +32,7 @@ _FAR = 1e12  # ratio of two values beyond which the lower is a zero that roundin
 _PARTS = 32  # of a bracket of a small machine, counted together
 _HALVINGS = 60  # of a bracket at most: to neighbouring numbers
 _SMALL = 64  # rows of a pencil up to which eigenvalues cost less than turns of a response
-_FLOPS = 40  # cubed rows of a pencil whose eigenvalues take as long as one term of a count (`allowance`), measured
+FLOPS = 40  # cubed rows of a pencil whose eigenvalues take as long as one term of a count (`allowance`), measured
 _TOGETHER = 2**20  # numbers of matrices that are treated together, 8 MiB
 _NEWTON = 12  # steps of Newton's method at most; its convergence is quadratic
 _LIKELY = 3  # eigenvalues nearest to the axis, by each measure, that are tried as the one that crosses
@@ -59,7 +59,7 @@ class MatrixSearch:
     @cached_property
     def searched(self) -> tuple[float, float]:
         """Default range."""
-        grid = self._grid(None)
+        grid = self.grid()
         return float(grid[0]), float(grid[-1])
 
     @cached_property
@@ -70,7 +70,8 @@ class MatrixSearch:
         )  # fmt: skip
         return abs(self.value) or natural, natural
 
-    def _grid(self, between: tuple[float, float] | None) -> Array:
+    def grid(self, between: tuple[float, float] | None = None) -> Array:
+        """Values at which roots are counted, in a range or in `searched`."""
         domain = self.role.domain
         if np.isfinite(domain.high):
             found = samples.bounded(domain, _SHARE)
@@ -99,7 +100,7 @@ class MatrixSearch:
         If `sure`, UNKNOWN also where rounding hides whether a root grows.
         """
         found = np.full(len(values), UNKNOWN)
-        for part in self._parts(len(values)):
+        for part in self.parts(len(values)):
             machines = self.own.along(self.name, values[part])
             growing = self._growing(machines, sure)
             slides = np.where(growing == 0, STABLE, np.where(growing == UNDECIDED, UNKNOWN, UNSTABLE))
@@ -113,7 +114,7 @@ class MatrixSearch:
         """Rows of the pencils that the parameter may change."""
         return len(self.own.along(self.name, np.array([self.value])).a[0])
 
-    def _parts(self, count: int) -> list[slice]:
+    def parts(self, count: int) -> list[slice]:
         """Parts of so many machines that are treated together."""
         together = max(_TOGETHER // self._rows**2, 1)
         return [slice(start, start + together) for start in range(0, count, together)]
@@ -122,7 +123,7 @@ class MatrixSearch:
         """Number of growing roots, (p,), ILL_POSED or UNDECIDED. Of large machines by turns of a response."""
         if self._small or self.turns is None:
             count = len(machines.posed)
-            if not self._small and not may_take(count * len(self.own.pencil.a) ** 3 // _FLOPS):
+            if not self._small and not may_take(count * len(self.own.pencil.a) ** 3 // FLOPS):
                 return np.full(count, UNDECIDED)
             return machines.growing(sure)
         found = np.full(len(machines.posed), ILL_POSED)
@@ -180,7 +181,7 @@ class MatrixSearch:
         """Edges of a parameter that enters by a term of rank one."""
         low, high = self.searched if between is None else between
         steps, omega = real_crossings(change, turns, unit)
-        lost = self._lost(self._grid(between))
+        lost = self._lost(self.grid(between))
         values, omega = np.concatenate([self.value + steps, lost]), np.concatenate([omega, np.zeros(len(lost))])
         inside = (values > low) & (values < high) & self.role.domain.contains(values)
         order = np.argsort(values[inside])
@@ -214,7 +215,7 @@ class MatrixSearch:
         return bool(np.any(moved) or np.any(np.abs(other.gain - own.gain) > rounding))
 
     def _slides(self, values: Array) -> NDArray[np.bool_]:
-        parts = self._parts(len(values))
+        parts = self.parts(len(values))
         return np.concatenate([self.own.balances_along(self.name, values[part]).exists for part in parts])
 
     def _end(self, low: float, high: float) -> float:
@@ -225,7 +226,7 @@ class MatrixSearch:
 
     def _scanned(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
         """Edges by counting roots at samples."""
-        grid = self._grid(between)
+        grid = self.grid(between)
         status = self.statuses(grid).tolist()
         found = []
         for i in np.flatnonzero(np.diff(status)):

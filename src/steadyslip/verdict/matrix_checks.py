@@ -18,6 +18,7 @@ import sympy as sp
 
 from steadyslip.core.checks import Check, check
 from steadyslip.linear.boundary import Margin, without_edges
+from steadyslip.linear.matrix_coupling import growing_squares, squares_of
 from steadyslip.linear.matrix_route import STABLE_WORD, stability_word
 from steadyslip.linear.pencil import GOOD
 from steadyslip.linear.search import Boundary
@@ -117,11 +118,13 @@ def _sides_agree(point: MachinePoint, margin: Margin, edge: Boundary, share: flo
     """True if stability below and above an edge is what it says, at `share` of its value from it."""
     size = abs(edge.value) or abs(margin.value) or margin.searched[1]
     domain = point.machine.parameters()[edge.parameter].role.domain
-    words = []
+    beside = []
     for sign in (-1, 1):
         value = edge.value + sign * share * size
-        other = point.varied(edge.parameter, value if domain.contains(np.array([value]))[0] else edge.value)
-        words.append(stability_word(other))
+        beside.append(point.varied(edge.parameter, value if domain.contains(np.array([value]))[0] else edge.value))
+    if edge.quiet and all(one.balance.exists for one in beside):  # nothing damps the machine
+        return bool(np.diff([growing_squares(squares_of(one.pencil)) for one in beside])[0])
+    words = [stability_word(one) for one in beside]
     below, above = (word == STABLE_WORD for word in words)
     if edge.stable == "neither":
         return words[0] != words[1] and not below and not above

@@ -10,6 +10,8 @@ import pytest
 
 import steadyslip as ss
 from steadyslip.core.errors import UnitWarning
+from steadyslip.model.numeric.machine_point import machine_point
+from steadyslip.model.numeric.pencil import StatePencil
 
 EXAMPLE = Path(__file__).parents[2] / "examples/structures"
 TEXT = (EXAMPLE / "reed.toml").read_text(encoding="utf-8")
@@ -68,3 +70,35 @@ def test_a_misspelt_word_for_a_structure_is_one_problem(tmp_path, wrong):
 def test_the_former_name_of_the_key_is_read(tmp_path):
     one, other = (ss.read_rig(written(tmp_path, TEXT.replace("motion", key))) for key in ("motion", "kind"))
     assert one == other
+
+
+def modal(folder, modes):
+    """Path of the example's file with modes of the tip in place of matrices."""
+    (folder / "reed.csv").write_text(modes, encoding="utf-8")
+    points = TEXT.index("x = 22"), TEXT.index("angle =")
+    text = TEXT[: points[0]] + TEXT[points[1] :]
+    path = folder / "modal.toml"
+    path.write_text(text.replace('matrices = "reed.npz"', 'modes = "reed.csv"'), encoding="utf-8")
+    return path
+
+
+def test_a_mode_that_is_fed_is_asked_about(tmp_path):
+    with pytest.warns(UnitWarning, match=r"damping ratio of -0\.01, which feeds its mode: is its sign right"):
+        ss.read_rig(modal(tmp_path, "frequency,damping,tip.x,tip.y\n174,-0.01,0.001,11.9\n1090,0.007,0.01,-12\n"))
+
+
+def test_a_point_that_does_not_move_across_a_stiff_contact_is_asked_about(tmp_path):
+    with pytest.warns(UnitWarning, match=r"reed\.tip has none: is there a column or degree of freedom y of it"):
+        ss.read_rig(modal(tmp_path, "frequency,damping,tip.x\n174,0.01,11.9\n1090,0.007,12\n"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.read_rig(modal(tmp_path, "frequency,damping,tip.x,tip.y\n174,0.01,0.001,11.9\n1090,0.007,0.01,-12\n"))
+
+
+def test_modes_with_an_eigenvalue_to_the_last_digit_have_shapes():
+    """The pivot of zero became the least number there is, and the solutions overflowed."""
+    pencil = machine_point(ss.read_rig("examples/structures/reed.toml")).pencil
+    even = StatePencil(np.eye(4), np.diag([1.0, -2.0, -1e3, -4e3]) + np.triu(np.full((4, 4), 1e150), 2), 2, True)
+    for one in (pencil, even):
+        for s in one.eigenvalues:
+            assert np.all(np.isfinite(one.mode(complex(s))))

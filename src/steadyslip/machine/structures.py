@@ -188,6 +188,13 @@ class StructureBody(Body, name="structure"):
     points: Any = members(StructurePoint, "points, by name", default=Members())
     is_structure: ClassVar[bool] = True
 
+    def moves_across(self, point: str) -> bool:
+        """True if a point has a degree of freedom across its own x, or only one across."""
+        own = self.points.get(point)
+        given = None if own is None or (own.x, own.y) == (None, None) else (own.x, own.y)
+        along, across = given or self._read.points[point]
+        return across is not None or along is None
+
     def inconsistencies(self) -> Iterator[Problem]:
         if sum(one is not None for one in (self.matrices, self.modes, self.response)) != 1:
             yield Problem("matrices", _ONE)
@@ -225,6 +232,11 @@ class StructureBody(Body, name="structure"):
             of_modes = self.modes
             critical = 2 * np.sqrt(np.diag(of_modes.mass) * np.diag(of_modes.stiffness))
             ratios = np.diag(of_modes.damping)[critical > 0] / critical[critical > 0]
+            if len(ratios) and np.min(ratios) < 0:
+                yield (
+                    f"modes: {of_modes.source!r} has a damping ratio of {np.min(ratios):.3g}, which feeds its mode: "
+                    "is its sign right?"
+                )
             if len(ratios) and np.min(ratios) >= _DAMPED:
                 yield f"modes: {of_modes.source!r} has damping ratios from {np.min(ratios):.3g}; {small}"
             for (one, (_, y)), (other, (x, _)) in permutations(of_modes.points.items(), 2):

@@ -134,15 +134,25 @@ def _doubts(rig: Rig, questioned: Collection[str]) -> Iterator[str]:
 def _structure_doubts(rig: Machine) -> Iterator[str]:
     """What structures doubt, and contacts at points that do not move along the slide."""
     structures = {name: body for name, body in rig.bodies.items() if isinstance(body, StructureBody)}
-    for name, body in structures.items():
-        yield from (f"bodies.{name}.{text}" for text in body.doubts())
-    ends = [(name, end) for name, own in rig.contacts.items() for end in (own.body, own.against) if end]
-    for contact, end in ends:
+    own_doubts = {name: list(body.doubts()) for name, body in structures.items()}
+    for name, texts in own_doubts.items():
+        yield from (f"bodies.{name}.{text}" for text in texts)
+    ends = [(name, own, end) for name, own in rig.contacts.items() for end in (own.body, own.against) if end]
+    for contact, own, end in ends:
         name, _, point = end.partition(".")
         if name in structures and not np.any(structures[name].rows(point)[0]):
             yield (
                 f"contacts.{contact}: {end} has no displacement along the slide, so that friction moves nothing there: "
                 f"is there a column or degree of freedom x of it? Points: {', '.join(structures[name].point_names())}"
+            )
+        elif (
+            not own_doubts.get(name, ["no structure"])
+            and hasattr(own.contact, "normal_stiffness")
+            and not structures[name].moves_across(point)
+        ):
+            yield (
+                f"contacts.{contact}: its normal stiffness is pressed by motion across, and {end} has none: "
+                "is there a column or degree of freedom y of it?"
             )
 
 

@@ -177,7 +177,8 @@ class StatePencil:
         rows, columns = self.scale
         factors, pivots, _ = lapack.zgetrf(rows[:, None] * (s * self.e - self.a) * columns)
         diagonal = np.einsum("ii->i", factors)
-        diagonal[diagonal == 0] = np.finfo(float).tiny  # an eigenvalue to the last digit
+        last, largest = np.finfo(float).eps, np.max(np.abs(diagonal), initial=0.0)
+        diagonal[np.abs(diagonal) < last**2 * largest] = last * largest  # an eigenvalue to the last digit
 
         def solved(right: NDArray[Any], way: int) -> tuple[NDArray[Any], float]:
             found = lapack.zgetrs(factors, pivots, right, trans=way)[0]

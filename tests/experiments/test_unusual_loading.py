@@ -98,6 +98,7 @@ def test_rounding_of_a_displacement_is_no_spring():
     """The displacement of this record is exact: what moves with friction is its last digit."""
     fit, _ = ss.fit_files(["examples/data/made_velocity_step.csv"])
     assert "cannot show" not in str(fit)
+    assert spring(fit.plan.records[0]) is None
 
 
 @pytest.mark.parametrize("noise", ["waves", "slow", "white"])

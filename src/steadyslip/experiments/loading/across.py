@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from steadyslip.core.arrays import Array
-from steadyslip.experiments.loading.kinks import load_course, slips_and_glitches
+from steadyslip.experiments.loading.kinks import EXACTLY, load_course, slips_and_glitches
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.numerics.splitting import level_noise
 
@@ -44,7 +44,7 @@ def yielding(time: Array, displacement: Array, friction: Array, course: Course) 
     Displacement moves with friction on the lines of its course, or with fewer changes and friction it is followed as
     well as by a course of more, or late ones. The course is found again without that, until both agree.
     """
-    if course.curve is not None or not course.strays > 0:
+    if course.curve is not None or not course.strays > EXACTLY * float(np.ptp(displacement)):
         return None
     slips = np.empty((0, len(time)))
     keep = np.ones(len(time), dtype=bool)

@@ -137,8 +137,8 @@ def _structure_doubts(rig: Machine) -> Iterator[str]:
     own_doubts = {name: list(body.doubts()) for name, body in structures.items()}
     for name, texts in own_doubts.items():
         yield from (f"bodies.{name}.{text}" for text in texts)
-    ends = [(name, own, end) for name, own in rig.contacts.items() for end in (own.body, own.against) if end]
-    for contact, own, end in ends:
+    ends = [(name, end) for name, own in rig.contacts.items() for end in (own.body, own.against) if end]
+    for contact, end in ends:
         name, _, point = end.partition(".")
         if name in structures and not np.any(structures[name].rows(point)[0]):
             yield (
@@ -147,7 +147,7 @@ def _structure_doubts(rig: Machine) -> Iterator[str]:
             )
         elif (
             not own_doubts.get(name, ["no structure"])
-            and hasattr(own.contact, "normal_stiffness")
+            and any(one.startswith(f"contacts.{contact}.contact.") for one in rig.of_kind("stiffness"))
             and not structures[name].moves_across(point)
         ):
             yield (

@@ -340,6 +340,16 @@ def test_a_scan_with_two_delays_goes_on_where_some_far_samples_cannot_be_counted
     assert set(ss.stability(machine, {"friction.v_stribeck": [0.1, 1.0, 10.0]}).tolist()) == {"stable"}
 
 
+def test_a_map_tells_ill_posed_points_from_those_without_an_answer(tmp_path):
+    """They were told as points without a growth rate, to know more of by the status."""
+    gains = {"drive.kd": np.array([0.5, 0.9, 1.1, 1.5])}
+    found = ss.run_map(ss.Map(servo(1.0, 0.1), gains, ["growth_rate"]), tmp_path / "late.zarr")
+    assert found.statistics()["growth_rate"]["infinite"] == 0.5
+    said = str(found)
+    assert "for 50 % of the points; ill-posed for 50 %" in said
+    assert "compute status" not in said
+
+
 def test_delayed_damping_that_outweighs_what_acts_at_once_is_ill_posed():
     """Without mass, c s + Kd s exp(−sτ): from Kd = c on there are infinitely many growing roots."""
     base = servo(1.0, 0.1)

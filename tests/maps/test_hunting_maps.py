@@ -72,7 +72,10 @@ REFUSED = {
         lambda: ss.Map(ss.read_rig("examples/stick-slip.toml"), {"stiffness": [1e9]}, ["hunt"]),
         "'hunt' is of a drive that holds a place",
     ),
-    "another velocity": (lambda: ss.Map(axis(**THEORY), {"drive.velocity": [0.0, 1.0]}), "holds a place, and is 0"),
+    "another velocity": (
+        lambda: ss.Map(axis(**THEORY), {"drive.velocity": [0.0, 1.0]}),
+        "so that its velocity is 0",
+    ),
     "a value": (lambda: ss.Map(axis(**THEORY), {"drive.kp": [-1.0, 1.0]}), "got -1"),
     "no mass": (lambda: ss.Map(axis(**THEORY | {"mass": 0.0}), GAINS), "'hunt' is not offered: .* no mass"),
     "shares of variance": (lambda: ss.sensitivity(axis(**THEORY), {"kp": (1, 3), "ki": (1, 3)}), "compute a map"),

@@ -179,7 +179,10 @@ def fit_speed_files(files: Sequence[Path], law: str, changes: Sequence[str]) -> 
     loops = [path for path in files if is_loop(path)]
     tables = [path for path in files if path not in loops]
     if len(tables) != 1 or len(loops) > 1:
-        message = f"got {len(tables)} tables of speeds and {len(loops)} of displacement; allowed: one, and one or none"
+        message = (
+            f"got {len(tables)} tables of speeds and {len(loops)} of displacement; allowed: one table of speeds, and "
+            "one of displacement or none"
+        )
         raise NotAvailable(message)
     options: dict[str, Any] = {}
     hold: dict[str, Any] = {}

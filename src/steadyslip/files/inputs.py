@@ -118,7 +118,7 @@ def inside(root: Path, key: str) -> Path:
 
 
 def check_room(path: Path) -> Path:
-    """Path of a file to be written, unchanged.
+    """Return the path of a file to be written, after checking that it is no folder.
 
     Raises
     ------

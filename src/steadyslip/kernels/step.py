@@ -30,7 +30,7 @@ LOG_SAFETY_REJECTED = math.log(0.8)  # ln of the step over the longest allowed a
 
 
 class Step(Evaluator):
-    """Writer of the program of one step."""
+    """Writes the straight-line program of one integration step."""
 
     def __init__(self, kernel: Formulation, name: str = "step") -> None:
         super().__init__(kernel, Program(name))

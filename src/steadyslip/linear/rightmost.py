@@ -39,9 +39,7 @@ _FARTHEST = 700.0  # logarithm of the largest number, beyond which delayed terms
 _HALVINGS = 60  # largest number of bisections of a real part: more than the 53 bits of a double
 _LOST = 1e10  # periods within one delay beyond which rounding leaves fewer than six digits of the phase
 _CLOSE = (1e-4, 1e-3, 1e-2, 0.1)  # distances from `_line_of_many`, relative to it, up to which roots are sought
-_QUICK = (
-    1e5  # radians in all terms, up to the bound of frequencies, that are followed in less than a second if none leads
-)
+_QUICK = 1e5  # largest total phase (rad) of all delay terms up to the highest frequency: followed in less than a second
 _TOLD = 1e-3  # relative error up to which that line is told as the rate of the slowest decay
 _SAME_ROOT = 1e-9  # relative distance within which Newton's method has found one root again
 _ON_THE_LINE = 1e-3  # relative distance from a line of the real part of a root that is one of those on it

@@ -148,7 +148,7 @@ def chances_of(
 
 
 def places(count: int) -> int:
-    """Number of values of each of several unknown parameters that are tried."""
+    """How many values of each unknown parameter are tried, where there are `count` of them."""
     return PLACES if count < 3 else 2
 
 

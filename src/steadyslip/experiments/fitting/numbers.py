@@ -23,7 +23,7 @@ from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 
-BEYOND = 3.0  # errors by which the time of a change goes beyond its window: windows are no wider than noise makes them
+BEYOND = 3.0  # standard errors by which a fitted time of a change may lie outside its window
 SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
 DIFFERENCE = re.compile(r"^\s*(a\s*[-−]\s*b|b\s*[-−]\s*a)(?=@|\s*$)")  # a less all b, or its negative
 

@@ -113,7 +113,7 @@ def remedies(plan: Plan, ssq: float, values: Mapping[str, float]) -> tuple[Remed
 
 
 def _is_mended(tried: Iterable[Remedy]) -> bool:
-    """True if one leaves no structure, and is better by strong evidence."""
+    """True if a change that was tried leaves no structure in the residuals and fits better by strong evidence."""
     return any(one.p >= STRUCTURE and one.gain > STRONG_EVIDENCE for one in tried)
 
 

@@ -99,7 +99,7 @@ def _weights(fit: FitNumbers) -> list[str]:
 
 
 def _left_out(fit: FitNumbers) -> list[str]:
-    """Warnings on samples left out because their channel was full or they are far off others."""
+    """Warnings on samples left out because their channel was saturated or because they are outliers."""
     return [
         f"{record.source}: {note}; give weights to keep them"
         for record in fit.plan.records

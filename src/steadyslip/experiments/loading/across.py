@@ -17,7 +17,7 @@ WITH_FRICTION = -0.5
 none was beyond -.05; of 18 measured across the fault 12 were, the others lost in noise or in changes found instead."""
 REPEATS = 3  # times that the course is found again
 AS_WELL = 1.2  # ratio of scatters up to which one course follows a displacement as well as another
-CERTAIN = 10.0  # errors that a displacement lost per friction must be above 0: noise may be correlated
+CERTAIN = 10.0  # standard errors by which a compliance must exceed 0: more than 3, as noise may be correlated
 STEPS_OF_TIMES = 6  # of Newton's method for the times of steps; two or three suffice near them
 FEWEST = 5  # samples between two changes that show how both move
 

@@ -18,9 +18,9 @@ from steadyslip.experiments.loading.servo import GAIN, settling
 from steadyslip.experiments.numerics.noise import describe
 
 LONGEST_LAG = 0.2  # of a servo, as a share of the time around a change in which nothing else changes; chosen by trial
-SPARED = 14.0  # decrease of chi squared that a level of the sensor or half a run is worth which a servo makes needless
+SPARED = 14.0  # decrease of chi squared by which a servo must fit better for each sensor level, or half a run, it saves
 COARSE = 0.5  # share of the gain of a servo that the best of those where its search starts has, at least
-AROUND = 3.0  # times in which a servo settles that count as around a change
+AROUND = 3.0  # settling times of a servo that count as the neighbourhood of a change
 NEAR = 30.0  # samples on each side of a change that are kept one by one
 PER_EFOLD = 10.0  # means of the samples beyond, for each e-fold of their distance from the change; chosen by trial
 LEFT = 4.0  # standard errors by which the mean misfit around a change may be above that of normal noise, which is 0.83

@@ -194,7 +194,8 @@ class Map(Displayed):
             return
         for values in zip(*(a.reshape(-1) for a in np.broadcast_arrays(*vary.values())), strict=True):
             if not self.rig.with_values(dict(zip(vary, map(float, values), strict=True))).holds:
-                raise ParameterError([Problem("drive.velocity", "varies; the rig of this map holds a place, and is 0")])
+                message = "cannot be varied: the rig of this map holds a place, so that its velocity is 0"
+                raise ParameterError([Problem("drive.velocity", message)])
 
     def known(self) -> dict[str, Address]:
         """All parameters that may vary, by full name."""

@@ -159,8 +159,8 @@ class MapResult(Displayed):
             return None
 
     def statistics(self) -> dict[str, dict[str, float]]:
-        """Statistics of the finished chunks: shares of kinds; for numbers the range and the share of points
-        with a value.
+        """Statistics of the finished chunks: shares of kinds; for numbers the range, the share of points with a finite
+        value and, if there are any, of those with an infinite one.
         """
         store = self._store
         pending = store.pending()
@@ -168,19 +168,22 @@ class MapResult(Displayed):
         found: dict[str, dict[str, float]] = {}
         for name in self.results if total else ():
             words = self.words(name)
-            counts, low, high, exist = np.zeros(len(words) + 1), np.inf, -np.inf, 0
+            counts, low, high, exist, endless = np.zeros(len(words) + 1), np.inf, -np.inf, 0, 0
             for values in self._blocks(name):
                 if words:
                     counts += np.bincount(values.reshape(-1).astype(int) + 1, minlength=len(counts))
                     continue
                 finite = np.isfinite(values)
-                exist += int(np.count_nonzero(finite.any(axis=tuple(range(len(self.dims), values.ndim)))))
+                inner = tuple(range(len(self.dims), values.ndim))
+                exist += int(np.count_nonzero(finite.any(axis=inner)))
+                endless += int(np.count_nonzero(np.isinf(values).any(axis=inner) & ~finite.any(axis=inner)))
                 low = min(low, float(np.min(values, initial=np.inf, where=finite)))
                 high = max(high, float(np.max(values, initial=-np.inf, where=finite)))
             if words:
                 found[name] = {word: float(n / total) for word, n in zip(words, counts[1:], strict=True) if n}
             else:
                 found[name] = {"share": exist / total} | ({"low": low, "high": high} if exist else {})
+                found[name] |= {"infinite": endless / total} if endless else {}
         return found
 
     def _blocks(self, name: str) -> Iterator[np.ndarray]:
@@ -227,11 +230,13 @@ class MapResult(Displayed):
                 text = format_growth(low, high if low < high else None) if unit == "1/s" else text
                 text += "" if found["share"] == 1 else f", for {format_percent(found['share'])} of the points"
             else:
-                text = "nowhere"
+                text = "nowhere" if "infinite" not in found else "nowhere finite"
+            endless = found.get("infinite", 0.0)
+            text += f"; {self.what_infinite(name)} for {format_percent(endless)}" if endless else ""
             if (
                 self.why_missing(name) in (NOT_SLIDING, NO_EDGE)
                 and "status" not in self.results
-                and found.get("share", 1) < 1
+                and round(found.get("share", 1) + endless, 12) < 1
             ):
                 text += "; compute status as well to know of the rest"
             lines.append(f"  {name:<{width}}{text}")

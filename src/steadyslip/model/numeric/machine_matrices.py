@@ -220,7 +220,7 @@ class _Assembler:
         return found
 
     def moving(self, shares: Mapping[str, Any]) -> Any:
-        """Velocity that a row gets from the load point."""
+        """Velocity (m/s) that the motion of the load point contributes to a row's velocity."""
         return self.number(shares.get(LOAD_POINT, 0)) * self.velocity
 
     def matrices(self) -> MachineMatrices:

@@ -61,7 +61,7 @@ def unstable_by_itself(rig: Slider | Machine) -> str:
     moves = tuple(_moves(rig, root))
     found = sorted(_changes(rig, [(one,) for one in moves]))
     remedy = "no change of one of its gains and times makes it stable"
-    if not found and _has_matrices(rig):  # which takes milliseconds
+    if not found and _has_matrices(rig):  # pairs are tried only where a trial takes milliseconds
         found = sorted(_changes(rig, itertools.combinations(moves, 2)))[:1]
         remedy = "no change of one or two of its gains and times makes it stable"
     if found:

@@ -161,7 +161,7 @@ def threshold_brackets(
     progress: bool | None = None,
     branch: int = 0,
 ) -> tuple[Brackets, Any, Any]:
-    """Brackets behind `threshold_map` as plain arrays, with dimensions and coordinates of DataArrays apart."""
+    """Brackets of `threshold_map` as plain arrays, then the names of dimensions and the coordinates of DataArrays."""
     flat, _, together = broadcast_arrays(rig, Protocol(), vary, {})
     shape = together.shape
     size = int(np.prod(shape, dtype=int))

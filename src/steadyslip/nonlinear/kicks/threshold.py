@@ -287,7 +287,7 @@ class _Search:
             found = int(self._outcomes(np.array([beyond]), PATIENCE)[0])
             if found == INTERRUPTED:
                 raise KeyboardInterrupt
-            self.outcome = LATE if found == RETURNS else found  # neutral sliding is no return there
+            self.outcome = LATE if found == RETURNS else found  # neutral sliding at the edge survives nothing
 
     def _enough(self, precision: float) -> float:
         """Width of the bracket at which it is narrow enough."""

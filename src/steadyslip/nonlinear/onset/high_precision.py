@@ -185,7 +185,7 @@ class _Rig:
         return [*found[first : len(found) - contacts], *map(mpmath.re, rows), *map(mpmath.im, rows)]
 
     def _jacobian(self, y: Array) -> Array:
-        """Jacobian of `_residuals` in double precision; differences for unknowns that are numbers of the rig."""
+        """Jacobian of `_residuals` in double precision; columns of parameters of the rig are finite differences."""
         n, many = self.n, len(y) - 2 - 2 * self.n
         dynamic, first = self.system.dynamic, len(self.system.entries[0])
         base = np.array([*map(float, self.arguments), *y[:many]])

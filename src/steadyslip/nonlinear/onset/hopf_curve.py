@@ -235,7 +235,7 @@ class _Plane:
         first, second, _ = self.parameters(u)
         for column, role in zip((first, second), self.roles, strict=True):
             if not np.all(role.domain.contains(column)):
-                raise Failure("outside the domain")
+                raise Failure("a parameter leaves its allowed range")
         both = dict(zip(self.names, (first, second), strict=True))
         found = operating_point(self.rig, both, self.present, self.branch, scan=True)
         if not np.all(found.valid):

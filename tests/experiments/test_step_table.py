@@ -151,6 +151,9 @@ def test_latex_and_methods(joint, table, tmp_path):
     one = joint["d_c"]
     digits = 1 - int(np.floor(np.log10(1e6 * one.error)))
     assert rf"${1e6 * one.value:.{digits}f} \pm {1e6 * one.error:.{digits}f}$" in body[-1]
+    for line, printed in zip(table.lines, body[1:], strict=False):  # a step at 11676.4 s was printed at 11680
+        if line.step is not None:
+            assert float(printed.split(" & ")[2]) == pytest.approx(line.step.time, rel=1e-6)
     assert table.methods in text.splitlines()[0]
     assert "slip law, 1 state, linker-dieterich memory of normal stress" in table.methods
     assert "4 steps were fitted alone" in table.methods

@@ -45,6 +45,7 @@ DRIVEN = {
 """What drives the model, by `drive` of a fit, where it is not found in the record."""
 PRINTED, LABEL = 120, 20  # characters of a line of a printed table, and of a file's name in it
 PLAIN = ("velocity step", "normal-stress step", "hold")  # kinds of steps that a printed change tells by its units
+TIME = 7  # figures of times: steps are at some ten thousand seconds of a record, known to a tenth
 TYPESET = {one: f"\\{one}" for one in "_%&#$"} | {
     "±": r"$\pm$", "−": "$-$", "×": r"$\times$", "²": "$^2$", "<": "$<$", ">": "$>$",
     "α": r"$\alpha$", "μ": r"$\mu$", "σ": r"$\sigma$", "Σ": r"$\Sigma$", "Θ": r"$\Theta$", "τ": r"$\tau$",
@@ -196,7 +197,7 @@ class StepTable(Displayed):
         rows, notes = [], self.notes
         for line in self.lines:
             own, here = line.estimates(), line.about()
-            cells = [_cell(here[name], _shown(si, name)) for name, si in about.items()]
+            cells = [_cell(here[name], _shown(si, name), TIME if si == "s" else 4) for name, si in about.items()]
             told = ",".join(str(1 + notes.index(text)) for text in warnings(line.fit))
             cells[1] += f"$^{{{told}}}$" if told else ""
             cells += [_with_error(own.get(name)) for name in names]
@@ -478,13 +479,13 @@ def _letter(name: str, rig: Slider) -> str:
     return " / ".join(found)
 
 
-def _cell(value: Any, shown: str) -> str:
+def _cell(value: Any, shown: str, digits: int) -> str:
     """Text or number (SI) of a cell, in the unit shown."""
     if value is None:
         return "--"
     if isinstance(value, str):
         return _escaped(value)
-    return format_quantity(value / unit(shown)[0], "1")
+    return format_quantity(value / unit(shown)[0], "1", digits)
 
 
 def _escaped(text: str) -> str:

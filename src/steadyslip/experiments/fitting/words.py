@@ -382,7 +382,9 @@ def drive_line(fit: FitNumbers) -> str:
         text += "; at first as the step before left friction"
     slips, glitches = sum(c.slips for c in loads), sum(c.glitches for c in loads)
     if slips or glitches:
-        text += f"; {slips} slips and {glitches} glitches of the sensor left out"
+        kinds = (slips, "slip", "slips"), (glitches, "glitch", "glitches")
+        said = " and ".join(f"{n} {one if n == 1 else many}" for n, one, many in kinds if n)
+        text += f"; {said} of the sensor left out"
     other = fit.as_measured
     if other is None:
         return text

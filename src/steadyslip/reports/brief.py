@@ -76,7 +76,7 @@ DIMENSIONLESS = frozenset(
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
 _HIDDEN = frozenset(
     """rig version plan data protocol area unit units html start fit fits draws search noise plot map resonances told
-    where columns windows fails unlisted""".split()  # noqa: SIM905
+    where columns windows fails unlisted joint""".split()  # noqa: SIM905
 )
 _SKETCH_CAPTION = (
     "Motion is to the right. Thick bars and the rounded frame: the drive; dashed line: what it measures; arrows with a "

@@ -16,7 +16,7 @@ import lab_records as lab
 import steadyslip as ss
 import stress_steps_at_random as random_steps
 from steadyslip.experiments.answers.laws import with_law
-from steadyslip.experiments.fitting import memories
+from steadyslip.experiments.fitting import memories, numbers, remedies
 from steadyslip.experiments.fitting.effort import Budget
 from steadyslip.experiments.fitting.memories import Rival, opened
 from steadyslip.experiments.fitting.planning import make_plan
@@ -195,6 +195,23 @@ def test_white_residuals_speak_for_no_memory():
         "residuals are noise, and with the memories that were tried the fit is worse, which speaks for none"
         in " ".join(str(fit).split())
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("gain", "told"), [(15.0, True), (5.0, False)])
+def test_another_evolution_that_is_better_is_told_before_memories_that_fit_as_well(monkeypatch, gain, told):
+    """A record that another law follows 15 better in BIC was 'fitted as well' with a memory, and a - b quoted."""
+    other = "friction.evolution = 'aging'"
+    monkeypatch.setattr(numbers, "mended", lambda *_: True)
+    monkeypatch.setattr(numbers, "remedies", lambda plan, ssq, values, rounds: (
+        remedies.Remedy(other, 0.97 * ssq, gain, 0.9, dict(values)),))  # fmt: skip
+    by = 0.01 * lab.STRESS
+    protocol = ss.Protocol(
+        pieces=(ss.protocol.VelocityStep(at=30.13, to=3e-6), ss.protocol.NormalStressStep(at=60.41, by=by)), until=120
+    )
+    fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), protocol, 1, count=300))
+    assert any(one.choice == other for one in fit.remedies) is told
+    assert (f"no memory of it: with {other} the sum of squares" in " ".join(str(fit).split())) is told
 
 
 def test_bic_decides():

@@ -133,7 +133,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
     def with_memories(self) -> Self:
         """The same fit, with wider errors of what a memory of normal stress that fits as well moves, or none if far.
 
-        Where one fits better, the text says so, as it does where residuals have structure.
+        Where one fits better, or another law with one, the text says so, as it does where residuals have structure.
         """
         forgets = forgets_changes(self.plan)
         if not ((forgets or stress_alone(self.plan)) and self.search.converged) or self.whiteness.p < STRUCTURE:
@@ -141,6 +141,12 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         rivals = self._equal_memories()
         if not (rivals or forgets):
             return self
+        other = forgets and mended(self.plan, self.ssq, self.values)
+        better = remedies(self.plan, self.ssq, self.values, 1) if other else ()
+        if better and better[0].gain - max((one.remedy.gain for one in rivals), default=0.0) > STRONG_EVIDENCE:
+            same = replace(self)
+            same.__dict__["remedies"] = better
+            return same
         equal = [one for one in rivals if one.remedy.gain < STRONG_EVIDENCE]
         equal = equal if len(equal) == len(rivals) else []
         covariance, found = opened(self.space, self.covariance, equal)

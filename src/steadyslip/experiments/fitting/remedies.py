@@ -73,7 +73,7 @@ class Remedy:
     values: dict[str, float]
 
 
-def remedies(plan: Plan, ssq: float, values: Mapping[str, float]) -> tuple[Remedy, ...]:
+def remedies(plan: Plan, ssq: float, values: Mapping[str, float], rounds: int = ROUNDS) -> tuple[Remedy, ...]:
     """Minima with changes of the plan, the best first; up to two changes on top of each other.
 
     Those that are soon tried come first, and all memories of normal stress that the law lacks where that changes; the
@@ -86,10 +86,12 @@ def remedies(plan: Plan, ssq: float, values: Mapping[str, float]) -> tuple[Remed
         Sum of squares of the fit of the plan itself.
     values : mapping of str to float
         Values of that fit, by name of the unknown; a lag and a trend are searched from there.
+    rounds : int, optional
+        Changes that are tried on top of each other.
     """
     found: list[Remedy] = []
     base, known, size = plan, {""}, len(plan.space())
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         tried: list[tuple[Remedy, Plan]] = []
         changed = {_choice(plan, own): own for own in _changed(base)}
         new = [own for choice, own in changed.items() if choice not in known]

@@ -65,39 +65,7 @@ def test_continuation_starts_from_an_improved_prediction():
         curve = SolutionCurve(late, improved=improved)
         here = curve.start(np.zeros(2), np.array([3.0, 1.0]) / np.sqrt(10))
         taken.append(next(i for i, point in enumerate(curve.follow(here, 0.2, 1e-6, 0.5)) if point.u[1] > 2))
-    assert taken[1] < 0.75 * taken[0]
-
-
-def waves(noise=0.0):
-    """Points on x = sin 3p + .3 sin 11p up to p = 6, from equations with rounding of some size."""
-
-    def equations(u):
-        x, p = u
-        off = x - np.sin(3 * p) - 0.3 * np.sin(11 * p) + noise * np.sin(1e7 * (x + p))
-        return np.array([off]), np.array([[1.0, -3 * np.cos(3 * p) - 3.3 * np.cos(11 * p)]])
-
-    curve, points = SolutionCurve(equations), []
-    here = curve.start(np.zeros(2), np.array([6.3, 1.0]) / np.hypot(6.3, 1.0))
-    for point in curve.follow(here, 0.01, 1e-6, 0.5, limits=(-1.0, 6.0)):
-        points.append(point)
-        if point.u[1] > 6.0:
-            return points
-    return points
-
-
-def test_steps_do_not_depend_on_rounding():
-    exact, rounded = waves(), waves(1e-12)
-    assert len(exact) == len(rounded) > 30
-    np.testing.assert_allclose([one.u for one in exact], [one.u for one in rounded], atol=1e-7)
-
-
-def test_the_last_step_ends_just_past_the_range():
-    before, last = waves()[-2:]
-    assert 6.0 < last.u[1] < 6.0 + 0.3 * (last.u[1] - before.u[1])
-    curve = SolutionCurve(lambda u: (np.array([u[0] - u[1] ** 2]), np.array([[1.0, -2 * u[1]]])))
-    low = curve.start(np.array([0.0, 0.0]), np.array([0.0, 1.0]))
-    high = curve.start(np.array([1.0, 1.0]), np.array([2.0, 1.0]) / np.sqrt(5))
-    assert curve.at_parameter(low, high, 0.7).u == pytest.approx([0.49, 0.7], abs=1e-9)
+    assert taken[1] < 0.7 * taken[0]
 
 
 def test_a_zero_is_located_between_points_that_are_not_neighbours_in_length():

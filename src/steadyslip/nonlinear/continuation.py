@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from steadyslip.core.arrays import Array
 
@@ -19,20 +18,13 @@ Equations = Callable[[Array], tuple[Array, Array]]
 """u (n+1,) to residuals (n,) and their Jacobian (n, n+1). May raise `Failure`."""
 MOST_ITERATIONS = 10  # of Newton's method for one point
 ASIDE = 10.0  # factor of `reach` by which intermediate Newton iterates may be farther away
-ALIKE = 1e-6  # residuals, of the order of unknowns, below which a solution by residuals alone is one
-BEYOND = 1e100  # Newton step that counts as infinite: its square is still a number
 NEARLY = 1e-5  # Newton step below which one larger step may follow
-MOST_STEPS = 60  # of the search for one zero
 CHORDS = 8  # iterations with an earlier Jacobian: where more are needed, a new one is worth its time
-LONGER, SHRINK = 2.0, 0.4  # largest factor of the step after a point, and the factor after a failure; chosen by trial
-ORDER = 2  # of the error of prediction as a share of the step: a parabola misses by the third power
-CONTRACT = 0.5  # ratio wanted of the first two steps of Newton's method
-FAR = 1.0  # step beyond which a point may be no farther from its prediction: unknowns are of order one
-PAST = 1.1  # share of a step that leaves the range, of the part that lies in it
-TURN, OFF = (
-    0.55,
-    0.15,
-)  # shares wanted of the largest turn, and of the largest distance from the prediction to the point
+GROW, FASTER, SHRINK = (
+    1.4,
+    2.0,
+    0.4,
+)  # factors of the step after quick, straight and failed ones; chosen by trial
 
 
 class Failure(ArithmeticError):
@@ -44,7 +36,6 @@ class Point:
     """A solution on the curve, the unit tangent there, and the length of curve since the start.
 
     `rounding` is how much the last unknown, the parameter, is blurred by rounding in the equations, where that shows.
-    `contraction` is the ratio of the first two steps of Newton's method; zero where these are near the solution.
     """
 
     u: Array
@@ -52,7 +43,6 @@ class Point:
     length: float
     iterations: int
     rounding: float = 0.0
-    contraction: float = 0.0
 
 
 class SolutionCurve:
@@ -106,13 +96,10 @@ class SolutionCurve:
             If it does not converge, or only farther than `reach` from the guess: on something else.
         """
         across = self.weights * tangent
-        u, before, contraction, close, solved = guess.copy(), np.inf, 0.0, self.residuals is None, -1
+        u, before = guess.copy(), np.inf
         for iteration in range(MOST_ITERATIONS):
-            if not close:
-                u, before, close = self._approached(u, before, guess, across, ASIDE * reach)
-                solved = iteration if close else solved
-                if close and self.size(u - guess) > reach:
-                    raise Failure("the equations lead elsewhere")
+            if before > NEARLY:
+                u, before = self._approached(u, before, guess, across, ASIDE * reach)
             residual, jacobian = self.equations(u)
             self.jacobian = jacobian
             matrix = np.vstack([jacobian, across])
@@ -121,14 +108,10 @@ class SolutionCurve:
                 step = np.linalg.solve(matrix, right)
             except np.linalg.LinAlgError as error:
                 raise Failure("singular") from error
-            if not np.max(np.abs(step)) < BEYOND:
+            if not np.all(np.isfinite(step)):
                 raise Failure("not finite")
-            size = self._largest(step, u)
-            contraction = size / (before + NEARLY) if iteration == 1 else contraction
-            # solved by residuals, from which these differ by errors of evaluation
-            known = iteration == solved and size <= NEARLY and np.max(np.abs(residual)) <= ALIKE
-            u = u if known else u - step
-            size = min(before, self.tolerance) if known else size
+            u = u - step
+            size = float(np.max(np.abs(step) / np.maximum(1.0, np.abs(u))))
             standing = size > 0.3 * before
             rounded = standing and iteration > 2 and size <= self.rounding
             converged = size <= self.tolerance or (size < 10 * self.tolerance and standing) or rounded
@@ -139,82 +122,63 @@ class SolutionCurve:
                 along[-1] = 1.0
                 direction = np.linalg.solve(matrix, along)
                 blurred = abs(float(step[-1])) if size > 10 * self.tolerance else 0.0
-                return Point(u, direction / self.size(direction), length, iteration + 1, blurred, contraction)
+                return Point(u, direction / self.size(direction), length, iteration + 1, blurred)
             if size > 2.0 * max(before, NEARLY) and iteration > 2:
                 break
             before = size
         raise Failure("no convergence")
 
-    def _approached(
-        self, start: Array, moved: float, guess: Array, across: Array, reach: float
-    ) -> tuple[Array, float, bool]:
+    def _approached(self, start: Array, moved: float, guess: Array, across: Array, reach: float) -> tuple[Array, float]:
         """Near the solution, from residuals and the last Jacobian, kept up by Broyden's rule; and the last step's size.
 
-        `start` itself, and the step `moved` that led there, where that does not converge; last True where it does.
+        `start` itself, and the step `moved` that led there, where that does not converge.
         """
         if self.residuals is None or self.jacobian is None:
-            return start, moved, False
+            return start, moved
         u, size = start, np.inf
         with suppress(Failure, np.linalg.LinAlgError):
             inverse = np.linalg.inv(np.vstack([self.jacobian, across]))
             left = np.append(self.residuals(u), across @ (u - guess))
             for _ in range(CHORDS):
                 step = -inverse @ left
-                before, size = size, self._largest(step, u)
+                before, size = size, float(np.max(np.abs(step) / np.maximum(1.0, np.abs(u))))
                 if not size < before or self.size(u + step - guess) > reach:
                     size = before
                     break
                 u = u + step
                 if size <= self.tolerance:
-                    return u, size, True
+                    break
                 now = np.append(self.residuals(u), across @ (u - guess))
                 change = inverse @ (now - left)
                 inverse += np.outer(step - change, step @ inverse) / (step @ change)
                 left = now
-        return (u, size, size <= 10 * self.tolerance) if size < NEARLY else (start, moved, False)
-
-    @staticmethod
-    def _largest(step: Array, u: Array) -> float:
-        """Largest change of an unknown, relative to unknowns that exceed one."""
-        return float(np.max(np.abs(step) / np.maximum(1.0, np.abs(u))))
+        return (u, size) if size < NEARLY else (start, moved)
 
     def follow(
-        self, first: Point, step: float, least: float, most: float, accept: Callable[[Point], None] | None = None,
-        limits: tuple[float, float] = (-np.inf, np.inf),
-    ) -> Iterator[Point]:  # fmt: skip
+        self, first: Point, step: float, least: float, most: float, accept: Callable[[Point], None] | None = None
+    ) -> Iterator[Point]:
         """Yield points along the curve from `first`, which is not among them.
 
-        A point is taken for the continuation of the one before only if it is as close to its prediction as an arc would
-        be to its tangent that turns no more than is allowed, and does turn no more. It is predicted by the parabola
-        that the last two tangents make, and as much of the cubic through the last two points as would have been right
-        for the last one: where equations are strongly bent, steps along the tangent alone would stay tiny. The next
-        step is such that the turn, the error of prediction and Newton's contraction are what is wanted: continuous
-        measures, so that rounding does not change where points lie. It is at most `LONGER` times the one before, and at
-        most `most`, or a fifth of the largest unknown where that is more.
+        A point is taken for the continuation of the one before only if it is as close to the tangent there as an arc
+        would be that turns no more than is allowed, and does turn no more. It is looked for on the parabola that the
+        last two tangents make: where equations are strongly bent, steps along the tangent alone would stay tiny. Steps
+        grow up to `most`, or to a fifth of the largest unknown where that is more.
 
         Parameters
         ----------
         accept : callable, optional
             Raises `Failure` for points that are refused for other reasons.
-        limits : tuple of float, optional
-            Range of the last unknown: a step that would leave it by far is made shorter.
 
         Raises
         ------
         Failure
             Where steps of `least` no longer succeed.
         """
-        before, here, cubic = first, first, 0.0
+        here, curvature = first, np.zeros(len(first.u))
         while True:
             try:
-                parabola, further = self._ahead(before, here, step)
-                inside = min(max(parabola[-1], limits[0]), limits[1])
-                if inside != parabola[-1] and limits[0] < here.u[-1] < limits[1]:
-                    share = (inside - here.u[-1]) / (parabola[-1] - here.u[-1])
-                    step = max(min(PAST * share, 1.0) * step, 4 * least)
-                    parabola, further = self._ahead(before, here, step)
-                reach = self.bend * min(step, FAR) + 100 * self.tolerance
-                guess = parabola + cubic * further
+                reach = self.bend * step + 100 * self.tolerance
+                guess = here.u + step * here.tangent + 0.5 * step**2 * curvature
                 guess = guess if self.improved is None else self.improved(guess, reach)
                 ahead = self.corrected(guess, here.tangent, here.length + step, reach)
                 turned = float(ahead.tangent @ (self.weights * here.tangent))
@@ -228,89 +192,47 @@ class SolutionCurve:
                     raise
                 continue
             yield ahead
-            turn = np.arccos(min(turned, 1.0)) / np.arccos(self.most_turn)
-            off = self.size(ahead.u - guess) / reach
-            measures = turn / TURN, (off / OFF) ** (1 / ORDER), ahead.contraction / CONTRACT
-            longer = min(LONGER, 1 / max(*measures, 1 / LONGER))
-            step = min(step * longer, max(most, 0.2 * float(np.max(np.abs(ahead.u)))))
-            size = self.size(further) ** 2
-            best = float(further @ (self.weights * (ahead.u - parabola))) / size if size else 0.0
-            before, here, cubic = here, ahead, min(max(best, 0.0), 1.0)
-
-    def _ahead(self, before: Point, here: Point, step: float) -> tuple[Array, Array]:
-        """Predict the point a step ahead: on the parabola of the last two tangents, and what the cubic adds to that.
-
-        The cubic goes through both points along their tangents. Where the two points are one, the tangent is all.
-        """
-        back = before.u - here.u
-        chord, turned = self.size(back), float(before.tangent @ (self.weights * here.tangent))
-        straight = here.u + step * here.tangent
-        if not (chord > 0 and turned > 0):
-            return straight, 0 * straight
-        arc = chord / np.sinc(0.5 * np.arccos(min(turned, 1.0)) / np.pi)  # of a circle
-        rise, bend, share = back / arc + here.tangent, here.tangent - before.tangent, step / arc
-        curved = 0.5 * (bend - here.tangent * (here.tangent @ (self.weights * bend)))
-        parabola = straight + step * share * curved
-        return parabola, step * share * (3 * rise - bend - curved + share * (2 * rise - bend))
+            if ahead.iterations <= 4 and turned > 1 - 0.3 * (1 - self.most_turn):
+                straight = turned > 1 - 0.02 * (1 - self.most_turn)
+                step = min(step * (FASTER if straight else GROW), max(most, 0.2 * float(np.max(np.abs(ahead.u)))))
+            elif ahead.iterations > 6:
+                step *= 0.7
+            curvature = (ahead.tangent - here.tangent) / (ahead.length - here.length)
+            curvature -= ahead.tangent * (ahead.tangent @ (self.weights * curvature))
+            here = ahead
 
     def located(
         self, low: Point, high: Point, measure: Callable[[Point], float], at_low: float, at_high: float,
         width: float = 1e-11,
     ) -> tuple[Point, Point]:  # fmt: skip
-        """Bracket the zero of a function along the curve (Brent's method); the second point is the zero's.
+        """Bracket the zero of a function along the curve (Illinois method); the second point is the better one.
 
         Raises
         ------
         Failure
             If a point between the two cannot be found.
         """
-        end = float((self.weights * low.tangent) @ (high.u - low.u))  # as planes across are apart
-        reach = 2 * self.bend * abs(end) + 100 * self.tolerance
-        known = {0.0: (at_low, low), end: (at_high, high)}
-
-        def value(s: float) -> float:
-            if s not in known:
-                near, far = _around(sorted(known), s)
-                guess = self._between(low, known[near][1], known[far][1], s)
-                middle = self.corrected(guess, low.tangent, low.length + s, reach)
-                known[s] = measure(middle), middle
-                if not np.isfinite(known[s][0]):
-                    raise Failure("not finite")
-            return known[s][0]
-
-        zero = brentq(value, 0.0, end, xtol=width * (1 + abs(low.length)), maxiter=MOST_STEPS, disp=False)
-        others = [s for s in known if (known[s][0] > 0) != (known[zero][0] > 0)] or [0.0, end]
-        return known[min(others, key=lambda s: abs(s - zero))][1], known[zero][1]
-
-    def at_share(self, low: Point, high: Point, share: float) -> Point:
-        """Solve for the point between two at a share of the distance of their planes.
-
-        Raises
-        ------
-        Failure
-            If it is not found.
-        """
-        end = float((self.weights * low.tangent) @ (high.u - low.u))
-        reach = 2 * self.bend * abs(end) + 100 * self.tolerance
-        guess = self._between(low, low, high, share * end)
-        return self.corrected(guess, low.tangent, low.length + share * (high.length - low.length), reach)
-
-    def at_parameter(self, low: Point, high: Point, last: float, reach: float = np.inf) -> Point:
-        """Solve for the point between two at which the last unknown, the parameter, has a value between theirs.
-
-        Raises
-        ------
-        Failure
-            If it is not found, or only farther than `reach` from its prediction.
-        """
-        end = float((self.weights * low.tangent) @ (high.u - low.u))
-        share = brentq(lambda s: self._between(low, low, high, s * end)[-1] - last, 0.0, 1.0)
-        guess = np.append(self._between(low, low, high, share * end)[:-1], last)
-        length = low.length + share * (high.length - low.length)
-        reach = min(reach, self.size(high.u - low.u))
-        guess = guess if self.improved is None else self.improved(guess, reach)
-        point = self.corrected(guess, np.eye(len(guess))[-1], length, reach)
-        return point if point.tangent @ (self.weights * low.tangent) > 0 else replace(point, tangent=-point.tangent)
+        a, b, side = 0.0, float((self.weights * low.tangent) @ (high.u - low.u)), 0  # as planes across are apart
+        near, far = low, high
+        reach = 2 * self.bend * abs(b) + 100 * self.tolerance
+        for _ in range(60):
+            rise = at_high - at_low  # zero where the measure is rounding on both sides
+            s = b - at_high * (b - a) / rise if rise else a
+            if not a < s < b:
+                s = 0.5 * (a + b)
+            middle = self.corrected(self._between(low, near, far, s), low.tangent, low.length + s, reach)
+            value = measure(middle)
+            if (value > 0) == (at_low > 0):
+                a, at_low, near = s, value, middle
+                at_high = at_high / 2 if side == 1 else at_high
+                side = 1
+            else:
+                b, at_high, far = s, value, middle
+                at_low = at_low / 2 if side == -1 else at_low
+                side = -1
+            if value == 0 or b - a <= width * (1 + abs(low.length)):
+                break
+        return (near, far) if side == -1 else (far, near)
 
     def _between(self, low: Point, near: Point, far: Point, s: float) -> Array:
         """Predict the point at distance `s` along the tangent of `low`, on the cubic through two points."""
@@ -322,12 +244,6 @@ class SolutionCurve:
             bends = [0.0 * chord] * 2
         guess: Array = near.u + share * chord + share * (1 - share) * ((1 - share) * bends[0] - share * bends[1])
         return guess
-
-
-def _around(known: list[float], s: float) -> tuple[float, float]:
-    """Neighbours of a number in a sorted list."""
-    i = int(np.searchsorted(known, s))
-    return known[i - 1], known[i]
 
 
 def turned_round(point: Point) -> Point:

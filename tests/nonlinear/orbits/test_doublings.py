@@ -235,7 +235,7 @@ def two_doublings():
 def test_each_doubling_has_a_part_of_the_work(two_doublings, monkeypatch):
     """Where the sheet from the first one takes all it may, that from the other is still followed from its end."""
     branch, flips = two_doublings
-    monkeypatch.setattr(tracer, "MOST_STEPS", 80_000)
+    monkeypatch.setattr(tracer, "MOST_STEPS", 120_000)
     sheets = doubled_pieces(tracer_of(branch.onset, 0, None), flips)
     assert [sheet.bounds[0].value for sheet in sheets] == [flip.value for flip in flips]
     assert min(len(sheet.points) for sheet in sheets) > 3

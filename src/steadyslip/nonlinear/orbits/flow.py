@@ -6,9 +6,8 @@ Cycles are fixed points of this map. Inputs are constant: `FlowRunner` takes the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 import sympy as sp
@@ -92,10 +91,8 @@ class FlowSetting:
         How slip at the contact that is watched follows from the state, m.
     speed : float
         At which that contact slips as fast as the load point goes, m/s.
-    plain : tuple of ndarray
-        Constants and settings (one row each) of the plain kernel.
-    with_sensitivities : callable
-        Returns those of the kernel with sensitivities.
+    plain, varied : tuple of ndarray
+        Constants and settings (one row each) of the plain kernel and of the one with sensitivities.
     """
 
     value: float
@@ -105,12 +102,7 @@ class FlowSetting:
     slip: Array
     speed: float
     plain: tuple[Array, Array]
-    with_sensitivities: Callable[[], tuple[Array, Array]]
-
-    @cached_property
-    def varied(self) -> tuple[Array, Array]:
-        """Constants and settings of the kernel with sensitivities, built when they are first asked for."""
-        return self.with_sensitivities()
+    varied: tuple[Array, Array]
 
 
 class FlowRunner:
@@ -211,23 +203,21 @@ class FlowRunner:
 
     def _set(
         self, point: OperatingPoint, inputs: Array, value: float = 0.0, unit: float = 1.0,
-        rates: Callable[[], tuple[Array, Mapping[sp.Symbol, Array]]] | None = None,
+        rates: tuple[Array, Mapping[sp.Symbol, Array]] | None = None,
     ) -> FlowSetting:  # fmt: skip
-        """Build a setting; `rates` returns the derivatives of constants and inputs in the parameter, per unit."""
+        """Build a setting; `rates` are the derivatives of constants and inputs in the parameter, per unit."""
+        constants = self.machine.constants(point)
         settings = self._settings_at(point, value)
-
-        def varied() -> tuple[Array, Array]:
-            scales, behind = settings[0, self.tolerances], self.tolerances.stop
-            ratio = (scales[None, :] / scales[:, None] * self.options.rtol).ravel()  # S column by column
-            widened = np.concatenate([settings[0, :behind], ratio, scales, settings[0, behind:]])[None]
-            found = self.sensitive.constants(point)
-            changes = rates() if rates else (np.zeros((1, 1, found.shape[1])), {})
-            return self.sensitive.kernel.constants.with_rates(found, *changes), widened
-
+        scales, behind = settings[0, self.tolerances], self.tolerances.stop
+        ratio = (scales[None, :] / scales[:, None] * self.options.rtol).ravel()  # S column by column
+        varied = np.concatenate([settings[0, :behind], ratio, scales, settings[0, behind:]])[None]
+        found = self.sensitive.constants(point)
+        varying = self.sensitive.kernel.constants.with_rates(found, *(rates or (np.zeros((1, 1, found.shape[1])), {})))
         slip = [float(np.ravel(share)[0]) for share in point.evaluate(_slip_shares(self.reduction, self.contact))]
         speed = float(inputs[0]) * slip.pop()
-        plain = self.machine.constants(point), settings
-        return FlowSetting(value, unit, point, inputs, np.array(slip), speed, plain, varied)
+        return FlowSetting(
+            value, unit, point, inputs, np.array(slip), speed, (constants, settings), (varying, varied)
+        )  # fmt: skip
 
     def _settings_at(self, point: OperatingPoint, value: float) -> Array:
         """Kernel settings (tolerances, natural sizes), reused within `NEIGHBOURHOOD` of the parameter."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 
 import numpy as np
 import sympy as sp
@@ -106,7 +105,7 @@ class Flow(FlowRunner):
             raise Failure(str(explain_absence(rig, operating_point(rig))))
         unit = abs(value) or 1.0
         drive = np.ravel(point.drive)[0]
-        return self._set(point, np.array([drive, 0.0, 0.0]), value, unit, partial(self._rates, value, unit))
+        return self._set(point, np.array([drive, 0.0, 0.0]), value, unit, self._rates(value, unit))
 
     def _rates(self, value: float, unit: float) -> tuple[Array, Mapping[sp.Symbol, Array]]:
         """Derivatives of constants and inputs in the parameter, per unit, by central differences."""

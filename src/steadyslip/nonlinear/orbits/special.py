@@ -9,7 +9,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.nonlinear.continuation import Failure, Point
-from steadyslip.nonlinear.orbits.cycle import UNCERTAIN, Cycle, SpecialCycle
+from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 NOISE = 3e-9  # relative difference of parameter values below which they agree within rounding, near the onset
@@ -18,11 +18,6 @@ BLURRED = 10.0  # factor from the last Newton step to the uncertainty of the par
 ROUNDING = 1e-11  # relative difference of parameter values that is rounding anywhere
 FOLDED = 0.9  # growth below which a fold is rejected: at a true fold a multiplier is 1
 REAL = 1e-3  # largest relative imaginary part of a multiplier that counts as real: two that have just met differ by it
-LEVEL = 0.03  # slope of the parameter that is zero at a fold, in roots of rtol: the parameter is off by its square
-FLAT = (
-    0.4  # slope of the parameter in the middle of a step, as a share of their mean at its ends, below which it may turn
-)
-NONE = np.empty(0)
 SMALL = 1e-2  # amplitude of ln v below which multipliers equal to 1 within rounding are decided by the kind of onset
 
 
@@ -43,8 +38,6 @@ class BranchPoint:
 
 
 Made = Callable[[Shooting, Point], BranchPoint]
-Measure = Callable[[Array], float] | None
-"""Test function of the multipliers; None for that of folds, how the parameter changes along the curve."""
 
 
 def changes(before: BranchPoint, now: BranchPoint, made: Made, index: int) -> list[SpecialCycle]:
@@ -63,21 +56,21 @@ def changes(before: BranchPoint, now: BranchPoint, made: Made, index: int) -> li
         Place in the branch of the later point.
     """
     pair = [np.array(known.cycle.multipliers) for known in (before, now)]
-    kinds = list[tuple[str, Measure]]()
+    kinds: list[tuple[str, Callable[[Point], float]]] = []
     if before.point.tangent[-1] * now.point.tangent[-1] < 0:
-        kinds.append(("fold", None))
+        kinds.append(("fold", lambda point: float(point.tangent[-1])))
     apart = abs(before.cycle.value - now.cycle.value) > ROUNDING * abs(now.cycle.value)
     flips, turns = [doubling(m) for m in pair], [torus(m) for m in pair]
     if apart and now.shooting.flow.size > 2 and flips[0] * flips[1] < 0:
-        kinds.append(("period doubling", doubling))
+        kinds.append(("period doubling", lambda point: doubling(now.shooting.multipliers(point.u)[1])))
     if apart and min(turns) > -1 and turns[0] * turns[1] < 0:
-        kinds.append(("torus", torus))
+        kinds.append(("torus", lambda point: torus(now.shooting.multipliers(point.u)[1])))
     tried = [_located(kind, before, now, measure, made, index) for kind, measure in kinds]
     found = [one for one in tried if one is not None]
     growths = [known.cycle.growth for known in (before, now)]
     changed = before.cycle.stable != now.cycle.stable and (growths[0] - 1) * (growths[1] - 1) < 0
     if changed and not found and apart and min(known.cycle.amplitude for known in (before, now)) > SMALL:
-        tried = [_located("", before, now, growth, made, index)]
+        tried = [_located("", before, now, lambda point: growth(now.shooting.multipliers(point.u)[1]), made, index)]
         found = [replace(one, kind=_passing(one.cycle)) for one in tried if one is not None]
     return sorted(found, key=lambda one: one._length)
 
@@ -86,8 +79,7 @@ def may_return(earlier: BranchPoint, before: BranchPoint, now: BranchPoint) -> b
     """True if a test function may have changed sign twice between two neighbours, so that none is seen.
 
     It may where it would change, had it gone on as from the cycle before them; where a multiplier comes closer to the
-    unit circle than it moves in the step, too. The parameter may turn twice where the parabola of its slope with the
-    same ends and mean comes near zero in between.
+    unit circle than it moves in the step, too.
     """
     three = (earlier, before, now)
     lengths = [known.point.length for known in three]
@@ -99,23 +91,12 @@ def may_return(earlier: BranchPoint, before: BranchPoint, now: BranchPoint) -> b
     measures = [([measure(m) for m in multipliers], moved) for measure, moved in kinds]
     if earlier.shooting is now.shooting:  # tangents are measured alike; from the onset on they grow by factors
         measures.append(([known.point.tangent[-1] for known in three], 0.0))
-    if _turns_between(before.point, now.point):
-        return True
     for (was, here, there), moved in measures:
         if min(was, here, there) > -1 and here * there > 0:
             goes_on = here + ahead * (here - was)
             if goes_on * here < 0 or min(abs(here), abs(there)) < moved * abs(there - here):
                 return True
     return False
-
-
-def _turns_between(before: Point, now: Point) -> bool:
-    """True if the parameter may turn twice between two points: by the parabola that its slope is like."""
-    first, last = before.tangent[-1], now.tangent[-1]
-    mean = (now.u[-1] - before.u[-1]) / (now.length - before.length)
-    middle = (6 * mean - first - last) / 4
-    noise = NOISE / (now.length - before.length)
-    return bool(first * last > 0 and np.sign(first) * middle + noise < FLAT * abs(0.5 * (first + last)))
 
 
 def growth(multipliers: Array) -> float:
@@ -132,36 +113,17 @@ def _passing(cycle: Cycle) -> str:
 
 
 def _located(
-    kind: str, before: BranchPoint, now: BranchPoint, measure: Measure, made: Made, index: int
+    kind: str, before: BranchPoint, now: BranchPoint, measure: Callable[[Point], float], made: Made, index: int
 ) -> SpecialCycle | None:
-    """Locate the zero of a test function between two points; None if that fails or is no bifurcation.
-
-    It is sought to the error of the test function, of multipliers that of the trivial one.
-    """
-    shooting, values = now.shooting, dict[float, tuple[float, float]]()
-
-    def beyond_error(point: Point, trivial: float, others: Array) -> float:
-        """Value of the test function, zero where it is below the error of the multipliers."""
-        value = float(point.tangent[-1]) if measure is None else measure(others)
-        error = LEVEL * np.sqrt(shooting.flow.options.rtol) if measure is None else UNCERTAIN * abs(trivial - 1)
-        values[point.length] = value, error
-        return value if abs(value) > error else 0.0
-
-    def sought(point: Point) -> float:
-        return beyond_error(point, *(shooting.multipliers(point.u) if measure else (1.0, NONE)))
-
+    """Locate the zero of a test function between two points; None if that fails or is no bifurcation."""
+    shooting = now.shooting
     try:
-        ends = [
-            beyond_error(known.point, known.cycle.trivial, np.array(known.cycle.multipliers)) for known in (before, now)
-        ]
-        width = 0.1 * shooting.flow.options.rtol
-        beside, zero = shooting.curve().located(before.point, now.point, sought, ends[0], ends[1], width)
-        cycle = made(shooting, zero).cycle
+        ends = measure(before.point), measure(now.point)
+        low, high = shooting.curve().located(before.point, now.point, measure, *ends, 0.1 * shooting.flow.options.rtol)
+        cycle = made(shooting, high).cycle
     except Failure:
         return None
-    (value, error), (aside, _) = values[zero.length], values[beside.length]
-    left = max(abs(value), error) / abs(value - aside) if value != aside else 1.0
-    off = min(left, 1.0) * abs(shooting.orbit(beside.u).value - cycle.value)
+    other = shooting.orbit(low.u).value
     size = abs(cycle.value) or 1.0
     away = [abs(known.cycle.value - cycle.value) / size for known in (before, now)]
     blurred = max(NOISE, *(BLURRED * known.point.rounding for known in (before, now)))
@@ -169,9 +131,9 @@ def _located(
         return None
     if kind == "fold" and (min(away) < blurred or cycle.amplitude < SMALL):
         return None
-    precision = max(off / size, abs(cycle.trivial - 1) * max(away), 1e-12)
-    sides = (before.cycle.value, now.cycle.value) if kind == "fold" else (cycle.value - off, cycle.value + off)
-    return SpecialCycle(kind, cycle, (min(sides), max(sides)), float(precision), index, zero.length)
+    precision = max(abs(other - cycle.value) / size, abs(cycle.trivial - 1) * max(away), 1e-12)
+    beside = (before.cycle.value, now.cycle.value) if kind == "fold" else (other, cycle.value)
+    return SpecialCycle(kind, cycle, (min(beside), max(beside)), float(precision), index, high.length)
 
 
 def doubling(multipliers: Array) -> float:

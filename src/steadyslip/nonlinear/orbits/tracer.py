@@ -32,7 +32,6 @@ UNRESOLVED = 1e-7  # distance from 1 of a small cycle's multiplier below which i
 MOST_STEPS = 4_000_000  # integration steps for all pieces of a branch: two machines of the examples take three
 LOST = 1e-5  # error of the trivial multiplier beyond which more segments are tried
 LED = 30.0  # times as much of it where the motion leads the steps, still below `IMPRECISE`; then sensitivities do
-HALF = 0.5  # largest distance from a prediction, as a share of a small cycle's size: at 1 is steady sliding
 HIDDEN = 0.1  # largest share of rounding in a small cycle's distance from the edge
 INTERRUPTED = "interrupted by the user"
 USED_UP = "the work was used up"
@@ -85,9 +84,7 @@ class Tracer:
 
     def unknown(self, value: float) -> float:
         """Convert a parameter value (SI units) to the last unknown of the shooting equations."""
-        if not self.logarithmic:
-            return value / self.unit_of_value
-        return float(np.log(value / self.unit_of_value)) if value > 0 else -np.inf
+        return float(np.log(value / self.unit_of_value)) if self.logarithmic else value / self.unit_of_value
 
     # -- where a piece starts
 
@@ -299,9 +296,13 @@ class Tracer:
         Failure
             If it is not found.
         """
-        lengths = before.point.length, here.point.length
-        share = (length - lengths[0]) / (lengths[1] - lengths[0])
-        return self.branch_point(here.shooting, here.shooting.curve().at_share(before.point, here.point, share))
+
+        def measure(point: Point) -> float:
+            return point.length - length
+
+        ends = measure(before.point), measure(here.point)
+        point = here.shooting.curve().located(before.point, here.point, measure, *ends, width=np.inf)[1]
+        return self.branch_point(here.shooting, point)
 
     def _add(self, piece: BranchPiece, known: BranchPoint) -> None:
         """Append a point to the piece and report progress."""
@@ -318,7 +319,6 @@ class Tracer:
         stay small, states are measured by what they go through in a cycle (see `_rescaled`).
         """
         limit, error, again, idle = MOST_GROWTH, self._lost, True, 0
-        bounds = self.unknown(self.limits[0]), self.unknown(self.limits[1])
         steps: list[float] = []
         while True:
             made: dict[int, BranchPoint] = {}
@@ -331,7 +331,7 @@ class Tracer:
 
             finer = None
             try:
-                for point in curve.follow(here.point, step, SMALLEST_STEP, LARGEST_STEP, accept, bounds):
+                for point in curve.follow(here.point, step, SMALLEST_STEP, LARGEST_STEP, accept):
                     taken = point.length - here.point.length
                     idle = idle + 1 if taken <= step and taken < 1e-3 * LARGEST_STEP else 0
                     if idle > CREEP:
@@ -459,9 +459,19 @@ class Tracer:
             If it is not found.
         """
         shooting, target = far.shooting, self.unknown(value)
-        if (near.point.u[-1] - target) * (far.point.u[-1] - target) > 0:
+
+        def measure(point: Point) -> float:
+            return float(point.u[-1]) - target
+
+        ends = measure(near.point), measure(far.point)
+        if ends[0] * ends[1] > 0:
             raise Failure("not between")
-        point = shooting.curve().at_parameter(near.point, far.point, target, HALF * shooting.amplitude)
+        curve = shooting.curve()
+        close = curve.located(near.point, far.point, measure, *ends, width=1e-7)[1]
+        guess = np.append(close.u[:-1], target)
+        point = curve.corrected(guess, np.eye(len(guess))[-1], close.length, 0.1 * shooting.amplitude)
+        if point.tangent @ (curve.weights * close.tangent) < 0:
+            point = replace(point, tangent=-point.tangent)
         return self.branch_point(shooting, point)
 
 

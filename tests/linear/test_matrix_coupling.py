@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from steadyslip.linear.matrix_coupling import is_undamped
+from steadyslip.linear.matrix_coupling import nothing_damps
 from steadyslip.model.numeric.machine_point import machine_point
 
 FRICTION = "contacts.tip.friction.mu_coulomb"
@@ -54,9 +54,9 @@ def test_edges_of_random_structures(seed):
 
 
 def test_damping_anywhere_makes_it_an_ordinary_search():
-    assert is_undamped(machine_point(on_a_belt(np.eye(2), HOFFMANN_AND_GAUL, 4 / 3)).pencil)
+    assert nothing_damps(machine_point(on_a_belt(np.eye(2), HOFFMANN_AND_GAUL, 4 / 3)).pencil)
     damped = on_a_belt(np.eye(2), HOFFMANN_AND_GAUL, 4 / 3, np.diag([0.05, 0.05]))
-    assert not is_undamped(machine_point(damped).pencil)
+    assert not nothing_damps(machine_point(damped).pencil)
     (edge,) = ss.boundary(damped, FRICTION)
     assert edge.stable == "below"
 

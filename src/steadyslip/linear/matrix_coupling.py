@@ -82,7 +82,7 @@ def growing_squares(u: ComplexArray) -> NDArray[np.bool_]:
     return np.asarray(np.any((np.abs(u.imag) > _PART * np.abs(u)) | (u.real > _RISE * largest), axis=-1))
 
 
-def is_undamped(pencil: StatePencil | None) -> bool:
+def nothing_damps(pencil: StatePencil | None) -> bool:
     """True if no force of a machine follows a velocity, and nothing remembers."""
     return (
         pencil is not None and len(pencil.a) == 2 * pencil.size and not np.any(pencil.a[pencil.size :, pencil.size :])
@@ -92,10 +92,10 @@ def is_undamped(pencil: StatePencil | None) -> bool:
 def search_matrices(machine: Machine, name: str) -> MatrixSearch:
     """Search for edges of stability, or of growth where a machine is undamped at all its values."""
     found = MatrixSearch(machine, name)
-    if not found.own.balance.exists or not is_undamped(found.own.pencil):
+    if not found.own.balance.exists or not nothing_damps(found.own.pencil):
         return found
     grid = found.grid()
     along = [found.own.along(name, grid[part]) for part in found.parts(len(grid))]
     slides = [(one, int(i)) for one in along for i in np.flatnonzero(one.balance.exists & one.posed)]
-    everywhere = all(is_undamped(one.pencil(i)) for one, i in slides)
+    everywhere = all(nothing_damps(one.pencil(i)) for one, i in slides)
     return UndampedMatrixSearch(machine, name) if everywhere else found

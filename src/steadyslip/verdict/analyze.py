@@ -16,7 +16,7 @@ from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
 from steadyslip.core.options import checked
 from steadyslip.core.version import version
 from steadyslip.linear.boundary import Margin, edges_about, margins, margins_and_missing, oscillatory_edge
-from steadyslip.linear.matrix_coupling import is_undamped as undamped_matrices
+from steadyslip.linear.matrix_coupling import nothing_damps
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.mode_table import growth_origin
 from steadyslip.linear.modes import Mode, matrix_mode, mode_of
@@ -134,7 +134,7 @@ def _by_matrices(rig: Machine) -> _Linear:
         point,
         numbers,
         edged,
-        undamped_matrices(point.pencil),
+        nothing_damps(point.pencil),
         matrix_checks(point, numbers["stable"], edged),
         lambda: matrix_edge_checks(point, *margins_and_missing(rig)),
         lambda eigenvalue: matrix_mode(point, eigenvalue),

@@ -101,7 +101,7 @@ def _calls(fitted, grid, fresh):
         lambda **o: ss.experiments.profile(fitted, "friction.a", **({"count": 3} | o)): ("reach", "count", "threads"),
         lambda level: fitted.interval("friction.a", level): ("level",),
         lambda **o: ss.predict(RIG, fitted, **o): ("record", "kick"),
-        lambda **o: ss.fit(ss.lab_rig(), fitted.plan.records, ["friction.a"], **({"starts": 1} | o)): (
+        lambda **o: ss.fit(fitted.rig(), fitted.plan.records, ["friction.a"], **({"starts": 1} | o)): (
             "starts", "trend", "width", "threads"),
         lambda **o: ss.experiments.precision(lab.rig(), lab.STEP, **({"until": 80.0, "samples": 100} | o)): (
             "noise", "until", "samples"),

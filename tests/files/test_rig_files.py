@@ -342,6 +342,7 @@ def test_a_law_of_an_installed_package_is_found_by_its_entry_point(tmp_path):
     without = run("analyze", rig)
     assert without.returncode == 2
     assert "unknown friction law 'my-law'" in without.stderr
+    assert "entry points 'steadyslip.laws'" in without.stderr
     (tmp_path / "my_laws.py").write_text("import nonsense_that_is_not_there")
     broken = subprocess.run(command, capture_output=True, encoding="utf-8", env=on_path)
     assert broken.returncode == 2

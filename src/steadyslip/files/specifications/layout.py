@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import Field, dataclass, fields
+from difflib import get_close_matches
 from importlib.metadata import entry_points
 from typing import Any
 
@@ -108,7 +109,10 @@ def find_law(family: type[FrozenRecord], name: object) -> type[FrozenRecord]:
                 return law
     key, _ = selector(family)
     what = family.family if key in _OF_FAMILIES else key
-    raise ParameterError([Problem("", unknown_name(what, name, family.registry))])
+    message = unknown_name(what, name, family.registry)
+    if isinstance(name, str) and not get_close_matches(name, family.registry, cutoff=0.75):
+        message += f"; to add your own: import it in Python, or list it in a package's entry points {ENTRY_POINTS!r}"
+    raise ParameterError([Problem("", message)])
 
 
 def own_fields(law: type[FrozenRecord]) -> Iterator[tuple[Field[Any], Declared]]:

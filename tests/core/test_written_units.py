@@ -24,7 +24,7 @@ from steadyslip.files.specifications.tolerance_tables import rig_and_tolerances
 from steadyslip.files.specifications.write import stored_text
 from steadyslip.reports.brief import _results_table
 from steadyslip.reports.rig import input_table
-from steadyslip.verdict.words import told
+from steadyslip.verdict.words import format_parameter
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 AXIS = """
@@ -156,11 +156,11 @@ def test_every_parameter_is_told_in_the_unit_and_at_the_load_of_its_own_text():
         rig = ss.rig_from_text(text)
         for one in (rig, rig.with_values({"bodies.carriage.mass": 40.0}), ss.rig_from_text(stored_text(rig))):
             with display_units(one.written_in):
-                assert {name: told(one, name, one.value(name)) for name in written} == written
+                assert {name: format_parameter(one, name, one.value(name)) for name in written} == written
         with display_units(rig.written_in):
             for contact in ("guide", "seal"):  # what has no text is told at the load of its contact
                 load = rig.load_of(f"contacts.{contact}.friction.viscous")
-                shown = told(rig, f"contacts.{contact}.friction.viscous", 2.0)
+                shown = format_parameter(rig, f"contacts.{contact}.friction.viscous", 2.0)
                 force, _, at = shown.partition(" at ")
                 assert parse(at, "N") == pytest.approx(load)
                 assert parse(force, "N s/m") == pytest.approx(2.0 * load, rel=1e-3)
@@ -265,7 +265,7 @@ def test_a_parameter_is_told_in_its_own_unit_on_a_page_as_in_python():
             shown = script("told(one, value)", one={"factor": 1, "own": ["", 1, ""]} | data["usual"] | one,
                            value=one["value"] * many)  # fmt: skip
             with display_units(rig.written_in):
-                assert same_text(shown, told(rig, one["name"], given * many)), (one["name"], many)
+                assert same_text(shown, format_parameter(rig, one["name"], given * many)), (one["name"], many)
 
 
 def test_forces_of_a_file_in_newtons_stay_so():

@@ -20,7 +20,7 @@ from steadyslip.linear.boundary import Margin
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.verdict import Analysis
-from steadyslip.verdict.words import PACE, told
+from steadyslip.verdict.words import PACE, format_parameter
 
 _SPAN_FACTOR = 100.0  # ranges are drawn from value / 100 to value x 100
 LOST = ("lock-up", "lift-off", "no solution")
@@ -99,7 +99,7 @@ def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
                 ax.barh(row, b - a, left=a, height=0.62, color="none", edgecolor=BLACK, linewidth=0.6, label="_outline")
                 named.add(status)
         if margin.edge is not None:
-            beside(row, typeset(told(found.rig, margin.parameter, margin.edge.value)))
+            beside(row, typeset(format_parameter(found.rig, margin.parameter, margin.edge.value)))
     ax.axvline(1.0, color=BLACK, linewidth=2.5)
     ax.set_xscale("log")
     ax.set_xlim(1 / _SPAN_FACTOR, _SPAN_FACTOR)

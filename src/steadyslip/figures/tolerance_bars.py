@@ -11,7 +11,7 @@ from steadyslip.figures.style import add_legend_above, axes_or_new, is_narrow, p
 from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate
 from steadyslip.verdict.tolerances import Tolerated
-from steadyslip.verdict.words import told_range
+from steadyslip.verdict.words import format_parameter_range
 
 COLOURS = {True: STABLE, False: UNSTABLE, None: UNKNOWN}
 _DECADE = 10.0  # ratio of safety factors from which their axis is logarithmic: how far from 1 is a ratio on both sides
@@ -58,7 +58,9 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
             linewidth=1.8,
             label="all together",
         )
-    ranges = [typeset(told_range(found.rig, one.parameter, one.low, one.high)).replace("-", "−") for one in shown]
+    ranges = [
+        typeset(format_parameter_range(found.rig, one.parameter, one.low, one.high)).replace("-", "−") for one in shown
+    ]
     rows = [f"{parameter_label(found.rig, one.parameter)}\n{text}" for one, text in zip(shown, ranges, strict=True)]
     ax.set_yticks(range(len(shown) + 1), ["all together", *rows])
     ax.margins(x=0.06)

@@ -1,6 +1,6 @@
-"""Printable documents about rigs and results: HTML in one file, with the figures inside.
+"""Printable documents about rigs and results: one HTML file with all figures inside.
 
-`brief` makes the HTML that notebooks show of any result. Only the command line stands above this folder.
+`brief` returns the HTML that notebooks display for any result. Only the command line may import this folder.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def report(
     approval: str = "",
     **options: Any,
 ) -> Report:
-    """Printable HTML document about a rig or a result.
+    """Printable HTML document about a rig or a result, as a `Report`.
 
     Parameters
     ----------
@@ -43,21 +43,21 @@ def report(
     title : str, optional
         Line above the headline.
     explorer : bool, optional
-        If True, the explorer of the rig is at the end.
+        If True, the interactive page of the rig is appended.
     source : path, or sequence of them, optional
-        Files that the result was computed from; the document has their hashes.
+        Files that the result was computed from; the document lists their hashes.
     project, author, revision, approval : str, optional
-        Entries of the title block, which stands at the top if one of them is given.
+        Entries of the title block, which is printed at the top if any of them is given.
     **options
-        For a rig: ``charts``, pairs of parameters over which stability is drawn, instead of those with the
-        nearest edges; ``branch``, index of the steady state where there are several; ``fit``, a Fit or Population whose
-        friction is used, and ``tolerances``, as for `steadyslip.tolerate`, for the uncertainty of the verdict. For a
-        fit: ``comparison``, a LawComparison, and ``draws``, its Draws.
+        For a rig: ``charts``, pairs of parameters over which stability is drawn (default: those with the nearest
+        edges); ``branch``, index of the steady state if several exist; ``fit``, a Fit or Population whose friction is
+        used; ``tolerances``, as for `steadyslip.tolerate`, for the uncertainty of the verdict. For a fit:
+        ``comparison``, a LawComparison, and ``draws``, Draws of that fit.
 
     Returns
     -------
     Report
-        Shown in a notebook; ``save("rig.html")`` writes it, ``open()`` shows it in the browser.
+        Notebooks display it; ``save("rig.html")`` writes it to a file, ``open()`` opens it in the browser.
 
     Raises
     ------

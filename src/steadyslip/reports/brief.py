@@ -1,7 +1,7 @@
-"""HTML of any result, rig or model, as notebooks show it.
+"""HTML of any result, rig or model, as notebooks display it.
 
-An attribute has one meaning in all results, so its unit follows from its name: `UNITS` has SI units by
-name, attributes in `RESULT_UNIT` have the unit of the result (``result.unit``), those in `DIMENSIONLESS` have none.
+An attribute name has one meaning in all results, so the unit follows from the name: `UNITS` has SI units by name;
+attributes in `RESULT_UNIT` have the unit of the result (``result.unit``); those in `DIMENSIONLESS` have none.
 """
 
 from __future__ import annotations
@@ -83,11 +83,11 @@ _SKETCH_CAPTION = (
     "force: constant forces."
 )
 _MAX_ROWS = 12  # rows of a table of results, so that a notebook cell stays short (by trial)
-_MAX_VALUES = 4  # numbers of an array that are written out; longer ones are shown as shape and range (by trial)
+_MAX_VALUES = 4  # most numbers of an array that are printed; longer arrays as shape and range (by trial)
 
 
 def brief(result: Any) -> str:
-    """HTML of a result: kind, numbers with units, and a figure if it has one.
+    """HTML of a result: its kind, numbers with units, and its figure if it has one.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def brief(result: Any) -> str:
 
 
 def result_html(result: Any) -> str:
-    """HTML of a result without the style sheet, for a document that has it."""
+    """HTML of a result without the style sheet, for use inside a document that has it."""
     if isinstance(result, Model):
         return "".join(_model_html(result))
     return "".join(_record_html(result) if isinstance(result, FrozenRecord) else _result_html(result))
@@ -125,9 +125,9 @@ def sketch_of(record: Any) -> str:
 
 
 def text_html(text: str, caption: str = "") -> str:
-    """HTML of printed text: lines with two or more columns (two spaces apart) as tables, the others as paragraphs.
+    """HTML of printed text: lines with two or more columns (two spaces apart) become tables, others paragraphs.
 
-    Tables have the caption, by which a document numbers them.
+    Every table gets the caption, so that documents number it.
     """
     parts: list[str] = []
     words: list[str] = []
@@ -151,9 +151,9 @@ def text_html(text: str, caption: str = "") -> str:
 
 
 def _is_wrapped(line: str, after: str, indent: int) -> bool:
-    """True if a line looks cut at the width of a terminal, so that the next one continues its sentence.
+    """True if the line `after` seems to continue the sentence of `line`, which looks wrapped at a terminal's width.
 
-    The next one does not if it is indented less, or begins with a few words and a colon.
+    It does not if it is indented less than `indent`, or begins with a few words and a colon.
     """
     cut = len(line) > 60 and line[-1] not in ".:;)"
     return cut and len(after) - len(after.lstrip()) >= indent and not re.match(r" *[A-Za-z][\w ]{0,20}: ", after)
@@ -217,7 +217,7 @@ def _result_html(result: Any) -> Iterator[str]:
 
 
 def kind_of(result: Any) -> str:
-    """Kind of a result in words, such as "Rig comparison"."""
+    """Kind of a result as text from its class name, such as "Rig comparison"."""
     return " ".join(re.findall("[A-Z]+[a-z]*", type(result).__name__)).capitalize()
 
 
@@ -231,7 +231,7 @@ def _plot(result: Any) -> str:
 
 
 def _shown_attributes(result: Any) -> Iterator[tuple[str, Any]]:
-    """Names and values of the attributes to show, in order of declaration."""
+    """Names and values of the displayed attributes of a result, in order of declaration."""
     names = [one.name for one in fields(result)] if is_dataclass(result) else getattr(result, "_fields", vars(result))
     for name in names:
         if not name.startswith("_") and name not in _HIDDEN:
@@ -259,7 +259,7 @@ def unit_of(result: Any, name: str) -> str:
 
 
 def _named_cell(result: Any, name: str, value: Any, area: float | None) -> Any:
-    """`_cell` of an attribute of a result; growth rates and angular frequencies are no speeds of turning or gains."""
+    """`_cell` of an attribute of a result; rates stay in SI units instead of those that a rig file uses."""
     unit = unit_of(result, name)
     if name in _RATES:
         with si_units():
@@ -292,7 +292,7 @@ def _cell(value: Any, unit: str, area: float | None) -> Any:
 
 
 def _format_array(values: np.ndarray, unit: str, area: float | None) -> str:
-    """Text of an array: up to four values, or else shape and range."""
+    """Text of an array: its values if at most `_MAX_VALUES`, else shape and range; of text, counts of each."""
     if values.size == 0:
         return "none"
     if values.dtype.kind not in "fiu":
@@ -308,7 +308,7 @@ def _format_array(values: np.ndarray, unit: str, area: float | None) -> str:
 
 
 def _inner_tables(result: Any) -> Iterator[tuple[str, str]]:
-    """Names and HTML tables of the results and time series within a result."""
+    """Names and HTML tables of the results and time series that a result contains."""
     area = getattr(getattr(result, "rig", None), "area", None)
     for name, value in _shown_attributes(result):
         if isinstance(value, tuple) and value and is_dataclass(value[0]) and hasattr(type(value[0]), "_repr_html_"):
@@ -337,7 +337,7 @@ def _results_table(results: Iterable[Any], area: float | None) -> str:
 
 
 def _short_cell(result: Any, name: str, area: float | None) -> Any:
-    """Cell of a table of results: numbers, text and bool; empty for anything else."""
+    """Cell of a table of results for a number, text or bool; empty for other values."""
     value = getattr(result, name, None)
     own = getattr(result, "area", None) or area
     return _named_cell(result, name, value, own) if isinstance(value, bool | int | float | str) else ""

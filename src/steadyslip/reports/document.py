@@ -1,4 +1,4 @@
-"""HTML document about a rig or a result: contents, provenance, and the explorer at its end."""
+"""HTML document about a rig or a result: contents, provenance, and the rig's interactive page at the end."""
 
 from __future__ import annotations
 
@@ -61,20 +61,20 @@ class Report(HtmlDocument):
 
 @dataclass(frozen=True)
 class Parts:
-    """Contents of a document.
+    """Contents of a document, from which `document_html` builds the HTML.
 
     Attributes
     ----------
     headline, lead, question : str
-        Plain text: the answer, its reason, and the question.
+        Plain text: the answer (title), its reason, and the question that the document answers.
     body : sequence of str
-        HTML elements.
+        HTML elements in order.
     rig : Slider or Machine, optional
-        Rig to list as a file, and to explore at the end.
+        Rig whose file is listed, and whose interactive page is appended.
     protocol : Protocol, optional
-        Protocol to list in the file of the rig.
+        Protocol listed with the file of the rig.
     branch : int
-        Index of the steady state that the explorer shows.
+        Index of the steady state that the interactive page shows.
     """
 
     headline: str
@@ -87,12 +87,12 @@ class Parts:
 
     @property
     def rig_file(self) -> str:
-        """Text of the rig file, or the Python expression of a rig that no file can hold; empty without a rig."""
+        """Text of the rig file, or the Python expression of a rig that files cannot describe; empty without a rig."""
         if self.rig is None:
             return ""
         try:
             return rig_to_text(self.rig, self.protocol)
-        except ParameterError:  # a law that no file can name
+        except ParameterError:  # a law that is not known to rig files
             return repr(self.rig) if self.protocol is None else f"{self.rig!r}\n[protocol]\n{self.protocol!r}"
 
 
@@ -107,7 +107,7 @@ def document_html(
     source = sources[0] if sources else None
     live = ""
     if explorer and parts.rig is not None:
-        with suppress(NotAvailable):  # such as of a drive that holds a place
+        with suppress(NotAvailable):  # such as for a drive that holds a position
             live = fragment(parts.rig, title, parts.branch, source_text(source), "light")
     shown = heading("Try other values") + paragraph("Below, everything is computed in this page.") if live else ""
     article = (
@@ -122,7 +122,7 @@ def document_html(
 
 
 def _title_block(block: Mapping[str, str]) -> str:
-    """HTML table of project, author, revision and approval; empty if none of them is given."""
+    """HTML table of project, author, revision, approval and date; empty if all texts in `block` are empty."""
     rows = [(name, text or "\u2014") for name, text in block.items()]
     given = any(block.values())
     date = ("date", f"{datetime.now(UTC):%Y-%m-%d}")
@@ -130,7 +130,7 @@ def _title_block(block: Mapping[str, str]) -> str:
 
 
 def source_text(source: Path | None) -> str:
-    """Text of the rig file at `source`; empty if it is another kind of file, such as a table of results."""
+    """Text of the TOML file at `source`; empty for None, other kinds of files, and files that cannot be read."""
     try:
         return "" if source is None or source.suffix != ".toml" else text_of(source)
     except RigFileError:
@@ -138,13 +138,13 @@ def source_text(source: Path | None) -> str:
 
 
 def _listings(parts: Parts, sources: Sequence[Path]) -> list[str]:
-    """Texts of the file of the rig, or without one rig of all `sources`."""
+    """Texts of the files to list: that of the rig, or without a single rig those of all `sources`."""
     texts = map(source_text, sources) if parts.rig is None else [_rig_listing(parts, next(iter(sources), None))]
     return [text for text in texts if text]
 
 
 def _rig_listing(parts: Parts, source: Path | None) -> str:
-    """Text of a file of the rig: that of the user, with comments and units, if it has the same rig and protocol."""
+    """Text of the rig's file: that at `source`, with comments and units, if it has this rig; else generated."""
     own = source_text(source)
     if not own or source is None or parts.rig is None:
         return parts.rig_file
@@ -157,7 +157,7 @@ def _rig_listing(parts: Parts, source: Path | None) -> str:
 
 
 def _provenance(texts: Sequence[str], sources: Sequence[Path]) -> str:
-    """HTML section: versions, date, hashes of the sources, and the texts of rig files with their hashes."""
+    """HTML section with versions, date, hashes of the sources, and the `texts` of rig files with their hashes."""
     import numpy as np
     import scipy
     import sympy as sp

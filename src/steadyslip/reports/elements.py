@@ -19,17 +19,17 @@ _REPLACEMENTS = (
     (r"(?<![A-Za-z])u(?=(?:m|s|N|Pa|rad)(?![A-Za-z]))", "µ"), (r"\^2\b", "²"), (r"\^3\b", "³"), (r"->", "→"),
     (r"^x (?=-?\d)", "× "), (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"),
 )  # fmt: skip
-_SUBSCRIPT = re.compile(r"(?<![\w.])(?!^\w+$)([A-Za-zΑ-ω])_(\w+)(?!\.?\w)")  # no dotted name, and no key alone
-_NUMBER = re.compile(r"(?<=\d) (?=[^\s\d(])|(?<=[±×]) (?=[\d∞])")  # between a number and its unit, or what it counts
-_POWER = re.compile(r"(?<=10)([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+) (?=[A-Za-zµ])")  # between a power of ten and its unit
-_SLASH = re.compile(r"(\d\u00a0(?:[^\s/]+\u00a0)?[^\s/]+/)(?=\S)")  # within a unit, such as N/µm, behind its number
+_SUBSCRIPT = re.compile(r"(?<![\w.])(?!^\w+$)([A-Za-zΑ-ω])_(\w+)(?!\.?\w)")  # not in dotted names, or a key alone
+_NUMBER = re.compile(r"(?<=\d) (?=[^\s\d(])|(?<=[±×]) (?=[\d∞])")  # space behind a number
+_POWER = re.compile(r"(?<=10)([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+) (?=[A-Za-zµ])")  # space between a power of ten and its unit
+_SLASH = re.compile(r"(\d\u00a0(?:[^\s/]+\u00a0)?[^\s/]+/)(?=\S)")  # slash within a unit behind its number: 5 N/µm
 _UNIT = r"[mkMGTnµ]?(?:N|m|s|g|Pa|J|W|rad)|[cd]m|deg|rev"
 _WITHIN = re.compile(
     rf"(?<=\d\u00a0)(?:{_UNIT})[²³]?(?: (?:{_UNIT})[²³]?(?![\w.]))+"
-)  # a unit of several words behind its number
-_LONG = 30  # characters of a word that may be broken, for it is none
-_NARROW = 3  # columns that fit on a telephone (by trial, at 360 px)
-_NARROW_LINE = 44  # letters that fit beside each other there, of 13 px (358 px of some 8 px each)
+)  # unit of several words behind its number
+_LONG = 30  # characters of a word above which it may be broken anywhere, such as a hash
+_NARROW = 3  # most columns that fit on a telephone (by trial, at 360 px)
+_NARROW_LINE = 44  # most letters of 13 px in a line of a telephone's screen (358 px)
 _LINE = 90  # characters of plain text in a line of a formula (by trial, for the width of a page)
 _PIECE = 30  # most characters of a part of a formula that is never broken: some 300 px of the 358 px of a telephone
 _ZERO = '<mrow><mo form="infix">=</mo><mn>0</mn></mrow>'
@@ -105,14 +105,14 @@ def typographic(text: Any) -> str:
 
 
 def why(refused: Exception) -> str:
-    """Reason of a refusal, without what else to call, which a reader of a document cannot."""
+    """Reason given by an error, without its advice on calls, which the reader of a document cannot make."""
     return re.split(r"; (?:offered are|ask `|stable_stiffness)", str(refused))[0]
 
 
 def html_text(text: Any, prose: bool = False) -> str:
-    """Text with print typography, escaped for HTML; subscripts of letters, such as d_c, stand below the line.
+    """Text with print typography, escaped for HTML; subscripts such as that of d_c are set below the line.
 
-    No line breaks between a number and its unit or error, nor within a unit; in `prose` not behind its slash either.
+    No line breaks between a number and its unit or error, nor within a unit; in `prose` not after its slash either.
     """
     words = _WITHIN.sub(lambda unit: unit[0].replace(" ", "\u00a0"), _NUMBER.sub("\u00a0", typographic(text)))
     words = _POWER.sub("\\1\u00a0", words)
@@ -122,7 +122,7 @@ def html_text(text: Any, prose: bool = False) -> str:
 
 
 def with_subscripts(text: str) -> str:
-    """Text in which a letter and a digit, such as B0, are a letter with a subscript, B_0.
+    """Text in which a letter followed by a digit, such as B0, is written with a subscript, B_0.
 
     >>> with_subscripts("eq. 1: σ = σ0 - B0 T of B819")
     'eq. 1: σ = σ_0 - B_0 T of B819'
@@ -141,10 +141,10 @@ def heading(text: str, level: int = 2) -> str:
 
 
 def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = True, caption: str = "") -> str:
-    """HTML table; `Markup` cells are kept, others escaped. With `left` the first cell of a row is its header.
+    """HTML table; `Markup` cells are kept, others escaped. With `left` the first cell of each row is a row header.
 
-    Tables with a caption are numbered by the style sheet of a document, as figures are. On a narrow screen the rows of
-    one with more than `_NARROW` columns, or wider ones, become blocks, with the name of its column before each cell.
+    A document's style sheet numbers tables with a caption. On a narrow screen the rows of tables with more than
+    `_NARROW` columns, or wider than `_NARROW_LINE`, become blocks, with the name of its column before each cell.
     """
     rows = list(rows)
     above = f"<caption>{html_text(caption)}</caption>" if caption else ""
@@ -169,7 +169,7 @@ def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = 
 
 
 def _least_width(rows: Sequence[Sequence[Any]]) -> int:
-    """Letters of the longest words of each column together, with the room between columns; HTML does not count."""
+    """Minimum width of a table in letters: longest word of each column, plus gaps; `Markup` cells are ignored."""
     columns = zip_longest(*rows, fillvalue="")
     longest = [
         max((len(word) for cell in column if not isinstance(cell, Markup) for word in _words(cell)), default=0)
@@ -179,7 +179,7 @@ def _least_width(rows: Sequence[Sequence[Any]]) -> int:
 
 
 def _words(cell: Any) -> list[str]:
-    """Parts of the text of a cell between which a line may be broken."""
+    """Parts of a cell's text between which a line may be broken."""
     text = _NUMBER.sub("\u00a0", typographic(cell))
     return [text] if _width_class(text) == " class=n" else text.split(" ")
 
@@ -190,7 +190,7 @@ def _breakable(name: str) -> str:
 
 
 def _width_class(cell: str) -> str:
-    """HTML class attribute: keeps a short cell, such as a value with unit, on one line; breaks hashes anywhere."""
+    """HTML class attribute of a cell: short ones (value with unit) stay on one line, long words break anywhere."""
     if max(map(len, cell.split()), default=0) > _LONG and "<" not in cell:
         return " class=l"
     return " class=n" if len(cell) <= 20 and re.search("[ \u00a0]", cell) else ""
@@ -201,14 +201,14 @@ class Markup(str):
 
 
 def math(expression: Any, display: bool = True) -> Markup:
-    """MathML of a SymPy expression, which browsers show without fonts or scripts."""
+    """MathML of a SymPy expression, which browsers display without extra fonts or scripts."""
     return _mathml(_presented(expression), display)
 
 
 def equation(one: sp.Eq) -> str:
-    """HTML of an equation on lines of its own: long sums go on below, as paper has no bar to scroll by.
+    """HTML of a displayed equation; long sums are broken into lines, since paper cannot be scrolled.
 
-    Terms of a sum are elements of their own, between which a telephone breaks lines.
+    Each term of a sum is an element of its own, so that narrow screens can break lines between terms.
     """
     left, right = one.args
     side, begin, end = (left, "", _ZERO) if right == 0 else (right, f"{_presented(left)}<mo>=</mo>", "")
@@ -229,11 +229,11 @@ def equation(one: sp.Eq) -> str:
 
 
 def _term(text: str, first: bool) -> list[str]:
-    """MathML of a term of a sum with its sign, which is spaced as between two of them unless it is the first.
+    """MathML pieces of a term of a sum with its sign; lines may be broken between pieces.
 
-    A wide term is in pieces, between which lines may end.
+    The sign is an infix operator, with space on both sides, unless the term is the first.
     """
-    if not first and re.match("(<mrow>)*<mo>−</mo>", text):  # not that of a numerator
+    if not first and re.match("(<mrow>)*<mo>−</mo>", text):  # sign of the term, not of a numerator
         text = text.replace("<mo>−</mo>", '<mo form="infix">−</mo>', 1)
     elif not first:
         text = f'<mo form="infix">+</mo>{text}'
@@ -242,7 +242,7 @@ def _term(text: str, first: bool) -> list[str]:
 
 
 def _rows(pieces: Iterable[str]) -> list[str]:
-    """MathML of pieces, parted into lines of `_LINE` characters at most, or of one piece."""
+    """Lines of MathML from pieces: each at most `_LINE` characters, unless a single piece is longer."""
     rows, room = [""], _LINE
     for piece in pieces:
         length = len(re.sub("<.*?>", "", piece))
@@ -255,7 +255,7 @@ def _rows(pieces: Iterable[str]) -> list[str]:
 
 
 def _pieces(element: ElementTree.Element, most: int = _PIECE) -> list[list[ElementTree.Element]]:
-    """Elements of a row in groups of some `most` characters, each of which begins with a sign or a slash."""
+    """Children of a MathML row in groups of about `most` characters; each group begins at a sign or a slash."""
     if element.tag != "mrow" or _length([element]) <= most:
         return [[element]]
     groups: list[list[ElementTree.Element]] = [[]]
@@ -265,7 +265,7 @@ def _pieces(element: ElementTree.Element, most: int = _PIECE) -> list[list[Eleme
             child.set("form", "infix" if n else "prefix")
         if n and (sign or (child.text == "/" and "".join(element[n - 1].itertext()).endswith(")"))):
             groups.append([])
-        if child.get("symmetric"):  # a bracket as high as a fraction, which may be in another piece
+        if child.get("symmetric"):  # bracket around a fraction that may be in another piece: fix its height
             child.set("minsize", "2.2em")
         groups[-1].append(child)
     found: list[list[ElementTree.Element]] = []
@@ -280,12 +280,12 @@ def _pieces(element: ElementTree.Element, most: int = _PIECE) -> list[list[Eleme
 
 
 def _length(elements: Iterable[ElementTree.Element]) -> int:
-    """Characters of elements."""
+    """Number of text characters in MathML elements."""
     return sum(len(text) for one in elements for text in one.itertext())
 
 
 def _lines(terms: Iterable[sp.Expr]) -> list[list[sp.Expr]]:
-    """Terms of a sum, parted into lines of `_LINE` characters at most, or of one term."""
+    """Terms of a sum by line: each line at most `_LINE` characters, unless a single term is longer."""
     lines: list[list[sp.Expr]] = [[]]
     for term in terms:
         if lines[-1] and len(" + ".join(map(str, [*lines[-1], term]))) > _LINE:
@@ -295,7 +295,7 @@ def _lines(terms: Iterable[sp.Expr]) -> list[list[sp.Expr]]:
 
 
 def _presented(expression: Any) -> str:
-    """Presentation MathML of an expression without the element around it."""
+    """Presentation MathML of an expression, without the enclosing `math` element."""
     if isinstance(expression, sp.Basic):  # asinh_exp(x, y) avoids overflow in computing; print it as asinh(x exp(y))
         expression = expression.replace(asinh_exp, lambda x, y: sp.asinh(x * sp.exp(y)))
     text: str = _Printer().doprint(expression)
@@ -306,9 +306,9 @@ def _presented(expression: Any) -> str:
 
 
 def _with_low_brackets(text: str) -> str:
-    """MathML with brackets as high as a letter, and those around a fraction as high as that.
+    """MathML in which brackets are as high as a letter, or as the fraction that they enclose.
 
-    Browsers make them twice as high as the larger half of what they hold, and one more size with each bracket within.
+    By default browsers make brackets twice as high as the larger half of their contents, and larger with each nesting.
     """
     opened: list[int] = []
     kinds: dict[int, str] = {}
@@ -323,11 +323,9 @@ def _with_low_brackets(text: str) -> str:
 
 
 class _Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no types
-    """Printer of MathML that looks alike in every font: no root signs, whose bar some lack, no towers of exponents."""
+    """MathML printer with equal looks in all fonts: no root signs (some fonts lack the bar), no stacked exponents."""
 
-    _inline = (
-        False  # fractions are on one line: within exp, log and fractions, where they would be too small to be read
-    )
+    _inline = False  # True within exp, log and fractions, where a fraction on two lines would be too small to read
 
     def _print_exp(self, expression: sp.exp) -> Any:
         return self._print_inline(sp.Function("exp")(*expression.args))
@@ -397,14 +395,14 @@ def inline_math(symbol: sp.Symbol) -> Markup:
 
 
 def figure(drawing: str, caption: str = "") -> str:
-    """HTML figure of a drawing with a caption; empty if the drawing is empty. Those that may scroll take the focus."""
+    """HTML figure of a drawing with a caption; empty if the drawing is empty. Large ones can be scrolled."""
     below = f"<figcaption>{html_text(caption)}</figcaption>" if caption else ""
     scrolls = ' tabindex="0"' if drawing.startswith(('<svg class="large"', '<img class="large"')) else ""
     return f"<figure{scrolls}>{drawing}{below}</figure>" if drawing else ""
 
 
 def beside(figures: Iterable[str]) -> str:
-    """HTML of figures of one column, two in a row where there is room; empty if all are."""
+    """HTML of figures, two in a row where the page is wide enough; empty if all figures are empty."""
     found = [one for one in figures if one]
     return f'<div class="pair">{"".join(found)}</div>' if found else ""
 

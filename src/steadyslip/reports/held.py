@@ -1,4 +1,4 @@
-"""Contents of the document of a rig whose drive holds a place: whether it hunts, and what ends that."""
+"""Document on a rig whose drive holds a position: recommendation of changes that end its hunting."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from steadyslip.nonlinear.hunting.hunt import hunt
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.reports.elements import heading, paragraph, table
 
-BAND = 2.0  # dead band over the amplitude; a band a little wider than the cycle only slows it down
-STIFFER = 2.0  # factor of all gains that is tried
-LONGER = 4.0  # length of the runs with changes over that of the run without, which bounds their computing time
+BAND = 2.0  # dead band tried, over the hunting amplitude; a band little wider than the cycle only slows it down
+STIFFER = 2.0  # factor tried on all gains
+LONGER = 4.0  # length of runs with changes over that of the run without: bounds computing time
 WHY = "it hunts because the integral winds up while friction at rest, larger than in sliding, holds the axis"
 _ON_TARGET = "in the end on the target, which its ever smaller strokes approach"
 HOLDS = (
@@ -30,14 +30,16 @@ HOLDS = (
 
 @dataclass(frozen=True)
 class Tried:
-    """A change of a rig that hunts, simulated.
+    """A changed version of a rig that hunts, and its simulated motion.
 
     Attributes
     ----------
     what : str
+        The change, as text.
     then : Hunt
+        Motion with the change.
     least : float
-        Distance from the target at which it may rest in other runs than this one: half a dead band; m or rad.
+        Distance from the target (m or rad) at which other runs may come to rest: half the dead band, or 0.
     """
 
     what: str
@@ -46,12 +48,12 @@ class Tried:
 
     @property
     def reach(self) -> float:
-        """Largest distance from the target, in the end of this run or of others; m or rad."""
+        """Largest distance from the target (m or rad) at the end of this run or of others."""
         rests = np.isfinite(self.then.settled_at) or self.then.hunts
-        return max(self.least, _reach(self.then) if rests else 0.0)  # ever smaller strokes end on the target
+        return max(self.least, _reach(self.then) if rests else 0.0)  # ever smaller strokes: it ends on the target
 
     def verdict(self, allowed: float) -> str:
-        """What the change is worth where `allowed` is the distance from the target that may be left."""
+        """Text on whether the change is a cure; `allowed` is the acceptable distance from the target (m or rad)."""
         if self.then.hunts is False and not self.then.runs_away:
             return "ends it" if self.reach <= allowed else "no cure: it rests, but farther off than that"
         if self.then.hunts and self.reach < allowed:
@@ -60,10 +62,10 @@ class Tried:
 
 
 def recommendation(result: Hunt) -> Iterator[str]:
-    """HTML of what ends hunting, each change alone and simulated anew; of an axis that settles, how near.
+    """HTML of the changes that end hunting, each simulated alone; if the axis settles, its distance from the target.
 
-    A change is called a cure only if the axis then rests within the dead band of its controller, or without one
-    nearer to the target than it hunts now.
+    A change counts as a cure only if the axis then rests within the dead band of its controller or, without a dead
+    band, nearer to the target than the amplitude of its hunting now.
     """
     yield heading("The recommendation")
     if result.runs_away:
@@ -83,7 +85,7 @@ def recommendation(result: Hunt) -> Iterator[str]:
 
 
 def _cures(result: Hunt) -> Iterator[str]:
-    """HTML of the changes that were tried, the best first, and of what each leaves."""
+    """HTML of the changes that were tried, the best first, with the distance from the target that each leaves."""
     unit, own, limits = result.unit, _reach(result), result.rig.drive.limits()
     asked = limits.dead_band if limits else None
     allowed = own if asked is None else float(asked) * _told_over_measured(result)
@@ -115,7 +117,7 @@ def _cures(result: Hunt) -> Iterator[str]:
 
 
 def _told_over_measured(result: Hunt) -> float:
-    """Motion of the body that an answer tells of for one of the body that the controller measures."""
+    """Ratio of the motion of the body that results refer to to the motion of the body that the controller measures."""
     return result.rig.feed()[0] / result.rig.seen()[0]
 
 
@@ -124,7 +126,7 @@ def _reach(result: Hunt) -> float:
 
 
 def _changed(result: Hunt) -> Iterator[tuple[str, Any, float]]:
-    """What may end the hunting of an axis: in words, the rig so changed, and the least distance that it may leave."""
+    """Changes that may end hunting: text, changed rig, and distance from the target that it may leave (m or rad)."""
     rig: Any = result.rig
     known = rig.parameters()
     rest = {

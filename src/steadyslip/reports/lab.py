@@ -1,4 +1,4 @@
-"""Documents about fits, draws, predictions, comparisons of laws and populations."""
+"""Documents on fits, draws (samples of fitted parameters), predictions, comparisons of laws and populations."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from steadyslip.verdict import analyze
 
 _FOUND = ("parameter", "value", "95 %")
 _FITTED = "Values that were fitted."
-_OVER_STRESS = "k/σ"  # name of stiffness over normal stress in the text of a fit
+_OVER_STRESS = "k/σ"  # stiffness over normal stress, as the text of a fit names it
 
 
 def record_names(fit: Fit) -> str:
@@ -58,7 +58,7 @@ def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | No
 
 
 def _answer(fit: Fit) -> str:
-    """What a fit says of friction, in a few words."""
+    """Headline of a fit: friction rises or falls with velocity, is not determined, or the law is not to be used."""
     if better(fit) is not None:
         return "Not to be used yet: this law leaves structure in the residuals"
     found = next((one for one in fit.derived if one.name.partition("@")[0] == "a - b"), None)
@@ -68,7 +68,7 @@ def _answer(fit: Fit) -> str:
 
 
 def _use(fit: Fit) -> Iterator[str]:
-    """HTML of what to do with the values of a fit."""
+    """HTML of the recommendation on using the values of a fit."""
     yield heading("The recommendation")
     if (other := better(fit)) is not None:
         yield paragraph(
@@ -82,7 +82,7 @@ def _use(fit: Fit) -> Iterator[str]:
 
 
 def _estimate_rows(fit: Fit | MachineFit, rig: Rig) -> list[tuple[str, str, str]]:
-    """Rows of a table of what was fitted: words with letters, value with error, 95 % interval."""
+    """Rows of the table of fitted parameters: name in words with letter, value with error, 95 % interval."""
     return [
         (estimate_words(rig, one.name), one.shown(), one.range() if one.determined else "not determined")
         for one in fit.estimates
@@ -90,7 +90,7 @@ def _estimate_rows(fit: Fit | MachineFit, rig: Rig) -> list[tuple[str, str, str]
 
 
 def _details(fit: Fit | MachineFit, rig: Rig) -> str:
-    """Listing of the text of a fit, with words and letters instead of the names that keys of files have."""
+    """HTML listing of the text of a fit, with names in words and letters instead of keys of files."""
     found = [*fit.estimates, *(fit.derived if isinstance(fit, Fit) else ())]
     words = {one.name: estimate_words(rig, one.name) for one in found} | {_OVER_STRESS: _OVER_STRESS}
     wide = max(map(len, words.values()))
@@ -100,7 +100,7 @@ def _details(fit: Fit | MachineFit, rig: Rig) -> str:
 
 
 def _lead(fit: Fit | MachineFit, rig: Rig) -> str:
-    """Sentence with the values that are determined."""
+    """Sentence with the parameters that are determined, and their values."""
     told = ", ".join(f"{estimate_words(rig, one.name)} {one.shown()}" for one in fit.estimates if one.determined)
     return f"{told[:1].upper()}{told[1:]}." if told else "No parameter is determined."
 
@@ -119,7 +119,7 @@ def _machine_fit(result: MachineFit, comparison: None = None, draws: None = None
 
 
 def _draws_section(result: Draws) -> list[str]:
-    """HTML of draws: values, errors and intervals beside those of the fit, sampler, figure."""
+    """HTML of draws: values of the fit, errors and 95 % intervals of the draws, sampler details and figure."""
     rows = []
     for one in result.fit.estimates:
         low, high = result.interval(one.name)

@@ -1,4 +1,4 @@
-"""Publications that descriptions of laws cite by name and year, in full."""
+"""Full references of the publications that descriptions of laws cite by author and year."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ METHOD = (
 
 
 def cited(text: str) -> list[str]:
-    """Publications that a text cites by the name of an author before the year.
+    """Full references of the publications that a text cites by first author and year.
 
     >>> [one[:8] for one in cited("Slip law (Ruina 1983; eq. 1 of Dupont & Bapna): ...")]
     ['A. Ruina']

@@ -1,4 +1,4 @@
-"""Document about the verdict on a machine: question, inputs, verdict, modes, edges, caveats."""
+"""Document on the verdict on a machine: question, inputs, verdict, modes, edges, assumptions."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from steadyslip.reports.sections import assumptions, motion, notes_of, reference
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.machine import nearest_edge
 from steadyslip.verdict.whole_text import facts
-from steadyslip.verdict.words import EIGENVALUE_COLUMNS, eigenvalue_row, headline, told
+from steadyslip.verdict.words import EIGENVALUE_COLUMNS, eigenvalue_row, format_parameter, headline
 
 _MAX_ROOTS = 12  # rows of the table of eigenvalues, so that it fits half a page (by trial)
 
 
 def verdict_parts(analysis: Analysis, tolerated: Tolerated | None = None, order: Order = ORDER) -> Parts:
-    """Contents of the document of a verdict on a machine, with tolerances if given."""
+    """Contents (`Parts`) of the document on a machine's verdict, with verdicts within tolerances if given."""
     machine = analysis.rig
-    speed = told(machine, "drive.velocity", float(machine.drive.velocity))
+    speed = format_parameter(machine, "drive.velocity", float(machine.drive.velocity))
     body = [
         *recommendation(analysis, order, tolerated),
         *assumptions(machine, analysis.warnings, rig_report.VALIDITY),
@@ -45,7 +45,7 @@ def verdict_parts(analysis: Analysis, tolerated: Tolerated | None = None, order:
 
 
 def _settable_edge(analysis: Analysis) -> str:
-    """Sentence on the nearest edge of what can be set, where the nearest of all, which the reason names, is another."""
+    """Sentence on the nearest edge among changeable parameters, if another parameter has the nearest edge of all."""
     edged = [one for one in analysis.margins if one.edge is not None]
     able = {one.parameter for one in changeable(analysis)}
     settable = next((one for one in edged if one.parameter in able), None)
@@ -63,7 +63,7 @@ def _verdict_figure(analysis: Analysis) -> str:
             "of 100 away or more, or not of a positive value."
         )
     broad = figure_html(lambda: figures.machine_verdict(analysis), words, 8.0)
-    narrow = column_html(lambda: figures.machine_verdict(analysis), words)  # the same, for a narrow window
+    narrow = column_html(lambda: figures.machine_verdict(analysis), words)  # one column, for a narrow window
     return figure(f'<div class="broad">{broad}</div><div class="narrow">{narrow}</div>' if broad else "", words)
 
 

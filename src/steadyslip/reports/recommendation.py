@@ -1,4 +1,4 @@
-"""What a document recommends: to keep a rig, or what to change so that it slides stably, and how far."""
+"""Recommendation of a document: keep a rig as it is, or change a parameter, and how far, so that it slides stably."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.change_costs import PART, SETTING, TASK, unit_cost
 from steadyslip.verdict.cures import default_adjust
 from steadyslip.verdict.tolerances import LEAST, format_chance
-from steadyslip.verdict.words import change_to, told
+from steadyslip.verdict.words import change_to, format_parameter
 
-BEYOND_EDGE = 0.2  # recommended distance of an edge from a value, share of the value: 10 % of error on both sides
-_ROUNDED = 1.01  # factor of that distance, so that a value rounded to the four digits that are printed still keeps it
-FAR = 10.0  # factor between a value and its change from which the change is named only: nobody orders such a part
-SURE = 0.95  # chance of stable sliding from which a rig is kept as it is: that which `cure` asks for
-_ROWS = 4  # changes that are recommended
-_STEPS = (1.1, 1.25, 1.5, 2.0)  # factors of a value that are tried to move a stable rig away from its edges (by trial)
-_FARTHER = (1.5, 2.0, 3.0, 4.0)  # factors of an edge tried where another edge is near to the value beyond it (by trial)
+BEYOND_EDGE = 0.2  # recommended distance of a value from an edge, as share of the value: allows 10 % error in each
+_ROUNDED = 1.01  # factor on `BEYOND_EDGE`: values rounded to four digits still keep that distance
+FAR = 10.0  # changes by a larger factor are only named, without values: nobody orders such a part
+SURE = 0.95  # chance of stable sliding from which a rig is kept as it is; default of `cure`
+_ROWS = 4  # most changes recommended
+_STEPS = (1.1, 1.25, 1.5, 2.0)  # factors on a value tried to move a stable rig away from its edges (by trial)
+_FARTHER = (1.5, 2.0, 3.0, 4.0)  # factors on an edge tried if another edge is close to the first value (by trial)
 
 
 @dataclass(frozen=True)
 class Order:
-    """What a document was asked for.
+    """Options for the document of a rig.
 
     Attributes
     ----------
     charts : sequence of (str, str)
         Pairs of parameters over which stability is drawn.
     adjustable : dict of str to Adjustment
-        What can be changed, by dotted name; if empty, all that the rig has but friction.
+        Parameters that can be changed, by dotted name; if empty, all except those of friction.
     source : str
         Text of the rig's file.
     unknown : mapping of str to (float, float)
@@ -61,9 +61,10 @@ ORDER = Order()
 def recommendation(
     analysis: Analysis, order: Order = ORDER, tolerated: Tolerated | None = None, title: str = "The recommendation"
 ) -> Iterator[str]:
-    """HTML of what to change, or to keep, with a margin beyond the edge; each value is judged anew.
+    """HTML of the recommended change, with a margin beyond the edge, or to keep the rig; each change is analysed anew.
 
-    With tolerances a rig is kept only where it is stable with a chance of `SURE`; otherwise stands what `cure` finds.
+    With tolerances a rig is kept only if it is stable with a chance of `SURE`; otherwise the changes by `cure` are
+    given.
     """
     adjustable = order.adjustable
     yield heading(title)
@@ -96,7 +97,7 @@ def recommendation(
 
 
 def _made_stable(analysis: Analysis, rows: Sequence[_Moved], begun: Mapping[str, _Begun]) -> Iterator[str]:
-    """HTML of the changes that make a rig stable, the first in words, all in a table."""
+    """HTML of the changes that make a rig stable: the first as a sentence, all in a table."""
     first, wanted = rows[0], format_percent(BEYOND_EDGE)
     origin = "" if analysis.origin is None else f" Why it is unstable: {analysis.origin.words}."
     origin += _friction_is_not_all(analysis)
@@ -117,7 +118,7 @@ def _made_stable(analysis: Analysis, rows: Sequence[_Moved], begun: Mapping[str,
 
 
 def _friction_is_not_all(analysis: Analysis) -> str:
-    """Sentence of a machine that friction feeds by the normal force, where less of it does not make it stable."""
+    """Sentence for a machine driven unstable through the normal force, if less friction does not make it stable."""
     origin, levels = analysis.origin, set(analysis.rig.of_kind("friction level"))
     if origin is None or origin.kind not in ("coupling", "normal force"):
         return ""
@@ -131,7 +132,7 @@ def _friction_is_not_all(analysis: Analysis) -> str:
 def _made_certain(
     analysis: Analysis, anywhere: StableWithin, tolerated: Tolerated | None, order: Order
 ) -> Iterator[str]:  # fmt: skip
-    """HTML of what makes a rig stable at all values of what is not known, and that measuring it may be enough."""
+    """HTML of the changes that make a rig stable at all values of its unknown parameters; measuring may do instead."""
     rig: Any = analysis.rig
     for one in anywhere.each:
         values = str(one).partition(": ")[2]
@@ -148,7 +149,7 @@ def _made_certain(
 
 
 def _made_sure(analysis: Analysis, tolerated: Tolerated, adjustable: Mapping[str, Adjustment]) -> Iterator[str]:
-    """HTML of what makes a rig stable with a chance of `SURE`, and of what to measure where that may be enough."""
+    """HTML of the changes that make a rig stable with a chance of `SURE`, and of the parameter best measured first."""
     wanted = format_percent(SURE)
     yield paragraph(f"{_within(tolerated)} Wanted is that {wanted} of all that is built within them are stable.")
     yield from _cured(
@@ -164,7 +165,7 @@ def _made_sure(analysis: Analysis, tolerated: Tolerated, adjustable: Mapping[str
 
 
 def _within(tolerated: Tolerated) -> str:
-    """Sentences on how many rigs within the tolerances are stable."""
+    """Sentence on the share of rigs within the tolerances that are stable."""
     rig, count = tolerated.rig, len(tolerated.stable)
     kind = "machine" if rig.in_forces else "rig"
     tried = f"({count} were tried{', and all corners of the ranges' if tolerated.corners else ''})"
@@ -173,13 +174,15 @@ def _within(tolerated: Tolerated) -> str:
         return f"Of the {kind}s that may be built within the tolerances, {chance} are stable {tried}."
     text = f"No {kind} within the tolerances is stable {tried}"
     if tolerated.otherwise:
-        values = (f"{said(rig, name)} {told(rig, name, value)}" for name, value in tolerated.otherwise.items())
+        values = (
+            f"{said(rig, name)} {format_parameter(rig, name, value)}" for name, value in tolerated.otherwise.items()
+        )
         return f"{text}, but for one at their very end: {', '.join(values)}."
     return f"{text}."
 
 
 def _is_far(value: float, to: float | None) -> bool:
-    """True of a change by more than a factor of `FAR`, or of what is zero."""
+    """True if a change of `value` to `to` is by more than a factor of `FAR`, or either is zero or None."""
     return to is None or not value or not to or not 1 / FAR <= abs(to / value) <= FAR
 
 
@@ -187,9 +190,9 @@ def _cured(
     analysis: Analysis, tolerances: Any, adjustable: Mapping[str, Adjustment], reached: str, at: str,
     unknown: Mapping[str, tuple[float, float]] | None = None,
 ) -> Iterator[str]:  # fmt: skip
-    """HTML of what `cure` finds: the cheapest change, the cheapest pair, and the windows of each parameter.
+    """HTML of the results of `cure`: the cheapest change, the cheapest pair, and the windows of each parameter.
 
-    What has the nearest edge is among the parameters, as the headline speaks of it.
+    The parameter with the nearest edge is among those changed, since the headline names it.
     """
     rig: Any = analysis.rig
     present = {name: one for name, one in default_adjust(rig).items() if rig.parameters()[name].value}
@@ -221,7 +224,7 @@ def _cured(
 
 
 def _left_out(far: Sequence[str]) -> str:
-    """HTML on changes by more than a factor of `FAR`, which are named only."""
+    """HTML line that names the parameters whose changes are left out as larger than a factor of `FAR`."""
     they = "they" if len(far) > 1 else "it"
     text = f"Left out, as {they} would have to change by more than a factor of {FAR:g}: {', '.join(far)}."
     return paragraph(text, "small")
@@ -232,9 +235,9 @@ def _moved(rig: Any, window: Window, to: float | None) -> str:
 
 
 def _windows(found: Cures, at: str, whole: bool) -> Iterator[str]:
-    """HTML table of the values of each parameter at which the chance is reached, and a line of those without any.
+    """HTML table of the windows of each parameter, and a line that names parameters without a window.
 
-    Changes by more than a factor of `FAR` are named only, unless `whole`.
+    Changes by more than a factor of `FAR` are only named, unless `whole` is True.
     """
     rig: Any = found.rig
     every = sorted((one for one in found.windows if one.windows), key=lambda one: one.cost)
@@ -253,11 +256,11 @@ def _windows(found: Cures, at: str, whole: bool) -> Iterator[str]:
 
 
 def changeable(analysis: Analysis, adjustable: Collection[str] = ()) -> list[Margin]:
-    """Margins that a document speaks of: of what would make the rig stable, or keep it so.
+    """Margins of the parameters whose change is discussed in a document.
 
-    Those that keep it so are nearest first; of the others those within a factor of `FAR` are first, and among them
-    what costs least by `steadyslip.verdict.change_costs`. They are of what is named in `adjustable`;
-    else of all that the rig has but friction, and of that if there is nothing else.
+    If the rig is stable these are parameters with an edge, nearest first; otherwise those that could make it stable:
+    first those within a factor of `FAR`, then by cost (`steadyslip.verdict.change_costs`). Only parameters named in
+    `adjustable` are taken; without any, all except those of friction, or else those of friction too.
     """
     edged = [one for one in analysis.margins if (one.edge if analysis.stable else _curing(one))]
     chosen = [one for one in edged if one.parameter in adjustable]
@@ -267,13 +270,13 @@ def changeable(analysis: Analysis, adjustable: Collection[str] = ()) -> list[Mar
 
 
 def _in_order(margin: Margin) -> tuple[bool, float, bool]:
-    """Sort key of a change: far ones last; then by what it costs; then those beside which no edge is nearer."""
+    """Sort key of a change: near before far; then by cost; then those whose stable window begins at `margin.edge`."""
     begins = _curing(margin)[0]
     return _is_far(margin.value, begins.value), unit_cost(margin.parameter), begins is not margin.edge
 
 
 def _what_to_hold(analysis: Analysis, adjustable: Collection[str]) -> str:
-    """Sentences on the nearest edge of all, and on that of what can be set, if it is another."""
+    """Sentences on the nearest edge of all parameters and, if different, on the nearest of a changeable parameter."""
     edged = [one for one in analysis.margins if one.edge is not None]
     if not edged:
         return "No parameter has an edge within range."
@@ -290,12 +293,12 @@ def _what_to_hold(analysis: Analysis, adjustable: Collection[str]) -> str:
 
 
 def _distance(margin: Margin, edge: Boundary) -> float:
-    """Distance of an edge from the value, as a share of the value; infinite where a share says nothing."""
+    """Distance of an edge from the value, as a share of the value; infinite for angles and values of zero."""
     return math.inf if margin.unit == "rad" or not margin.value else abs(edge.value / margin.value - 1)
 
 
 def _close_edges(margins: Sequence[Margin]) -> list[tuple[Margin, Boundary]]:
-    """Edges of a stable rig that are nearer than is recommended, nearest first."""
+    """Edges of a stable rig that are nearer than `BEYOND_EDGE`, nearest first, each with its margin."""
     every = [(one, edge) for one in margins for edge in one.about if _distance(one, edge) < BEYOND_EDGE]
     return sorted(every, key=lambda found: _distance(*found))
 
@@ -303,7 +306,7 @@ def _close_edges(margins: Sequence[Margin]) -> list[tuple[Margin, Boundary]]:
 def _kept_apart(
     analysis: Analysis, near: Sequence[tuple[Margin, Boundary]], adjustable: Collection[str]
 ) -> Iterator[str]:
-    """HTML of the edges of a stable rig that are too near, and of changes that move it away from them."""
+    """HTML of the edges `near` to a stable rig, and of changes that move the rig away from them."""
     rig, wanted = analysis.rig, format_percent(BEYOND_EDGE)
     listed = ", ".join(
         f"{said(rig, one.parameter)} at {_value(analysis, one, edge.value)} ({change_to(one, edge)})"
@@ -330,13 +333,15 @@ def _kept_apart(
 
 
 def _movable(analysis: Analysis, adjustable: Collection[str]) -> list[Margin]:
-    """What can be changed of a stable rig to move it away from its edges: the nearest ones, the speed last."""
+    """Margins of parameters to change so that a stable rig moves away from its edges: nearest edges; the speed last."""
     able = [one for one in changeable(analysis, adjustable) if one.value and one.unit != "rad" and not one.remote]
     return sorted(able[:_ROWS], key=lambda one: unit_cost(one.parameter))
 
 
 class _Moved(NamedTuple):
-    """A changed value: its parameter, name, value now and then in words, analysis then, nearest edge, its distance."""
+    """Result of changing one parameter: its name; texts of name, old and new value; analysis after the change; text on
+    the edge then nearest, and its distance as a share of the value.
+    """
 
     parameter: str
     cells: tuple[str, str, str]
@@ -346,17 +351,19 @@ class _Moved(NamedTuple):
 
     @property
     def far(self) -> str:
-        """Whether all edges are as far as is recommended."""
+        """``yes`` if all edges are at least `BEYOND_EDGE` away, else ``no``."""
         return "yes" if self.distance >= BEYOND_EDGE else "no"
 
 
 def _best_first(found: _Moved) -> tuple[bool, float]:
-    """Sort key: those at which all edges are far, then the others, the farthest first; the speed, the task, last."""
+    """Sort key of changes: farthest from the nearest edge first, up to `BEYOND_EDGE`; changes of the speed last."""
     return unit_cost(found.parameter) == TASK, -min(found.distance, BEYOND_EDGE)
 
 
 def _moved_away(analysis: Analysis, margin: Margin) -> _Moved | None:
-    """Change of a parameter away from its edge by the steps of `_STEPS`; None if no edge is then farther than now."""
+    """Best change of a parameter away from its edge by factors in `_STEPS`; None if none increases the distance from
+    the nearest edge.
+    """
     rises = margin.edge is None or margin.edge.value < margin.value
     sign = 1 if rises == (margin.value > 0) else -1
     now = min((_distance(one, edge) for one in analysis.margins for edge in one.about), default=math.inf)
@@ -366,7 +373,7 @@ def _moved_away(analysis: Analysis, margin: Margin) -> _Moved | None:
 
 
 def _tried(analysis: Analysis, margin: Margin, values: Sequence[float]) -> list[_Moved]:
-    """Those of the values at which sliding is stable, up to the first at which all edges are far."""
+    """Results for those `values` of a parameter at which sliding is stable, up to the first with all edges far."""
     rig: Any = analysis.rig
     found = []
     for to in values:
@@ -386,16 +393,14 @@ def _tried(analysis: Analysis, margin: Margin, values: Sequence[float]) -> list[
 
 
 def _made_by(analysis: Analysis, margin: Margin, values: Sequence[float]) -> _Moved | None:
-    """The first of the values at which all edges are far; else the first that is stable, as going farther is no help.
+    """Result for the first of `values` with all edges far, else for the first that is stable; None if there is none."""
 
-    None if it is stable at none.
-    """
     found = _tried(analysis, margin, values)
     return next((one for one in found if one.distance >= BEYOND_EDGE), found[0] if found else None)
 
 
 def _side(analysis: Analysis, margin: Margin) -> str:
-    """Parameter, its own value, and the side of its edge on which sliding stays stable."""
+    """Text with a parameter, its value, and the side of its edge on which to keep it."""
     edge = margin.edge.value if margin.edge else math.nan
     side = "below" if edge > margin.value else "above"
     now, end = (_value(analysis, margin, value) for value in (margin.value, edge))
@@ -403,7 +408,7 @@ def _side(analysis: Analysis, margin: Margin) -> str:
 
 
 def _curing(margin: Margin) -> list[Boundary]:
-    """Edges at which windows of stable values begin as seen from the rig's own value, the nearest window first."""
+    """Edges beyond which, seen from the rig's own value, sliding becomes stable; nearest first, without remote ones."""
     begins = [
         edge
         for edge in margin.edges
@@ -415,7 +420,7 @@ def _curing(margin: Margin) -> list[Boundary]:
 
 
 class _Begun(NamedTuple):
-    """Window of stable values that is wide enough: its edge in SI units and in words, and values to try inside it."""
+    """Window of stable values: its edge (SI units), text on the edge, and values to try inside, in order."""
 
     edge: float
     words: str
@@ -423,14 +428,14 @@ class _Begun(NamedTuple):
 
 
 def _begun(analysis: Analysis, margin: Margin, within: Adjustment | None) -> _Begun | None:
-    """The nearest window of stable values that is wide enough and allowed; None if there is none."""
+    """Nearest window of stable values that is allowed and wide enough for `BEYOND_EDGE`; None if there is none."""
     rig: Any = analysis.rig
     for edge in (one.value for one in _curing(margin)):
         rises = edge > margin.value
         sign = 1 if rises == (edge > 0) else -1
         if margin.unit == "rad":
             values = [edge + BEYOND_EDGE * (edge - margin.value)]
-        else:  # first that of which the edge is as far as is recommended
+        else:  # the first value has the recommended distance from the edge
             values = [edge / (1 - sign * _ROUNDED * BEYOND_EDGE), *(edge * step**sign for step in _FARTHER)]
         values = _allowed(values, edge, rises, within)
         if not values:
@@ -444,7 +449,7 @@ def _begun(analysis: Analysis, margin: Margin, within: Adjustment | None) -> _Be
 
 
 def _allowed(values: Sequence[float], edge: float, rises: bool, within: Adjustment | None) -> list[float]:
-    """Values beyond an edge, outward, cut off at the ends of what is allowed; none if that ends before the edge."""
+    """Values beyond an edge, clipped to the range allowed; empty if that ends before the edge."""
     if within is None:
         return list(values)
     low = -math.inf if within.low is None else within.low
@@ -454,4 +459,4 @@ def _allowed(values: Sequence[float], edge: float, rises: bool, within: Adjustme
 
 
 def _value(analysis: Analysis, margin: Margin, value: float) -> str:
-    return told(analysis.rig, margin.parameter, value, margin.value)
+    return format_parameter(analysis.rig, margin.parameter, value, margin.value)

@@ -1,4 +1,4 @@
-"""Documents about rigs, runs, cycles, thresholds, maps and sensitivities."""
+"""Documents on rigs, simulated motions, cycles, thresholds, maps and sensitivities."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.reports.recommendation import Order
 from steadyslip.reports.sections import notes_of, references
 from steadyslip.verdict import Analysis, Cures, Tolerated, analyze, tolerate
-from steadyslip.verdict.words import told_range
+from steadyslip.verdict.words import format_parameter_range
 
 MAX_ROWS = 24  # rows of a table of slip events or cycles, so that a document stays short (by trial)
 PHASE_PLANE = "Spring stress over velocity; black: steady sliding at every velocity, the dot at that of the load point."
@@ -50,7 +50,7 @@ CONTACT_PHASE_PLANE = (
 
 @singledispatch
 def parts_of(result: Any) -> Parts:
-    """Contents of the document of a result; for kinds without a document of their own, the HTML that notebooks show.
+    """Contents (`Parts`) of the document of a result; types without a document of their own get the HTML of notebooks.
 
     Raises
     ------
@@ -78,9 +78,9 @@ def parts_of(result: Any) -> Parts:
 def rig_section(
     rig: Slider | Machine | None, source: str = "", tolerances: Mapping[str, str] | None = None
 ) -> list[str]:  # fmt: skip
-    """HTML of the sketch and inputs of a rig, with comments of its file if its text is given; empty for None.
+    """HTML of the sketch and inputs of a rig, with comments from the text of its file, `source`; empty for None.
 
-    Tolerances are texts by name, or None for a result that knows of none.
+    Tolerances are texts by name, or None for results that have no tolerances.
     """
     if rig is None:
         return []
@@ -206,13 +206,13 @@ def _machine(
 
 
 def _of_held(rig: Slider | Machine, source: str, asked: Any) -> Parts:
-    """Contents of the document of a rig whose drive holds a place: whether it hunts."""
+    """Contents (`Parts`) of the document of a rig whose drive holds a position: whether it hunts."""
     if asked:
         raise NotAvailable(
             "the drive holds a place (velocity = 0), so the document is on whether it hunts, which knows no branch, "
             "fit, tolerances or charts; leave them out"
         )
-    return replace(_hunt(hunt(rig), source), protocol=None)  # its own file is listed, not the push that was tried
+    return replace(_hunt(hunt(rig), source), protocol=None)  # list the rig's own file, without the disturbance tried
 
 
 @parts_of.register
@@ -250,7 +250,7 @@ def _verdict_parts(result: Analysis, order: Order, within: Tolerated | None = No
 @parts_of.register
 def _cures(result: Cures, source: str = "") -> Parts:
     rig, lines = result.rig, [worded(result.rig, one) for one in result.sentences()]
-    ranges = {name: told_range(rig, name, *ends) for name, ends in result.ranges.items()}
+    ranges = {name: format_parameter_range(rig, name, *ends) for name, ends in result.ranges.items()}
     body = [
         *rig_section(rig, source, ranges),
         heading("What was found"), *(paragraph(sentence(one)) for one in lines[1:]), *_changes(result),
@@ -264,7 +264,7 @@ def _cures(result: Cures, source: str = "") -> Parts:
 
 
 def _changes(result: Cures) -> Iterator[str]:
-    """HTML tables of the values of every parameter at which the chance is reached, or beyond which it is lost."""
+    """HTML tables by parameter of the values that reach the required chance, or beyond which it is lost."""
     rig = result.rig
     if result.chance >= result.sure:
         rows = [
@@ -379,7 +379,7 @@ def _branch(result: CycleBranch) -> Parts:
 
 
 def _distinct_rows(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Rows whose first three cells differ from those of the row before; every n-th of these if more than `MAX_ROWS`."""
+    """Rows that differ from the row before in the first three cells; thinned evenly to `MAX_ROWS` at most."""
     apart = [row for i, row in enumerate(rows) if i == 0 or row[:3] != rows[i - 1][:3]]
     step = max(1, -(-len(apart) // MAX_ROWS))
     return apart[::-step][::-1]

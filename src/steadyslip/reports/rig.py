@@ -1,4 +1,4 @@
-"""Document about the verdict on a slider: question, inputs, verdict, uncertainty, edges, charts, formulas, caveats."""
+"""Document on the verdict on a slider: question, inputs, verdict, uncertainty, edges, charts, formulas."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ from steadyslip.reports.sections import (
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.change_costs import unit_cost
 from steadyslip.verdict.whole_text import facts, meaning
-from steadyslip.verdict.words import EDGE_WORDS, edge_rows, headline, told
+from steadyslip.verdict.words import EDGE_WORDS, edge_rows, format_parameter, headline
 
 VALIDITY = (
     "The verdict is on small disturbances of steady sliding: it holds for the model and the inputs below, and says "
@@ -66,9 +66,9 @@ VALIDITY = (
 def verdict_parts(
     analysis: Analysis, prediction: Prediction | None = None, tolerated: Tolerated | None = None, order: Order = ORDER
 ) -> Parts:
-    """Contents of the document of a verdict on a slider, with its uncertainty from a fit or tolerances if given."""
+    """Contents (`Parts`) of the document on a slider's verdict, with uncertainty from a fit or tolerances if given."""
     rig = analysis.rig
-    speed = told(rig, "drive.velocity", float(rig.drive.velocity))
+    speed = format_parameter(rig, "drive.velocity", float(rig.drive.velocity))
     body = [
         *recommendation(analysis, order, tolerated), *assumptions(rig, analysis.warnings, VALIDITY),
         heading("The rig"), sketch_of(rig),
@@ -90,10 +90,10 @@ def input_table(
     tolerances: Mapping[str, str] | None = MappingProxyType({}),
     notes: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """HTML table of the parameters of a rig: words, letter, value (totals if it has an area), meaning.
+    """HTML table of the parameters of a rig: name in words, letter, value (total if the rig has an area), meaning.
 
-    With its tolerance if any is given, None for a result that knows of none, and where it comes from: the comment
-    behind it in the rig file, if there is one. The speed of the drive is that of the body that the file names.
+    If `tolerances` is not empty a column has them (None: for results without tolerances), if `notes` is not empty one
+    has the comment of the rig file on each value. The drive's speed is that of the body that the file names.
     """
     model = None if rig.holds or by_matrices(rig) else build_model(rig)
     rows, inputs = [], rig.parameters()
@@ -129,7 +129,7 @@ def input_table(
 
 
 def _fed_body(rig: Slider | Machine, name: str) -> str:
-    """Clause on the body whose speed is told for that of the drive, and on this; empty where they are the same."""
+    """Clause on the body to which the printed drive speed refers, and on the speed in the equations; empty if equal."""
     if not isinstance(rig, Machine) or name != "drive.velocity" or rig.told(name, 1.0) == Rig.told(rig, name, 1.0):
         return ""
     own = format_quantity(*Rig.told(rig, name, float(rig.drive.velocity)))
@@ -137,12 +137,12 @@ def _fed_body(rig: Slider | Machine, name: str) -> str:
 
 
 def _remark(notes: Mapping[str, str], name: str) -> str:
-    """Comment behind a value in its file, without marks of code; or that it is of the file, or a default."""
+    """Comment on a value in its file, without backticks; ``rig file`` without comment, ``default`` if not in it."""
     return (notes[name].replace("`", "") or "rig file") if name in notes else "default"
 
 
 def _meaning(one: Address, letter: str) -> str:
-    """What a parameter is, with its `letter`; of the effects of friction also what they do."""
+    """Meaning of a parameter, with its `letter`; for effects of friction also what they do."""
     kind, doc = one.role.kind, one.role.meaning
     if "_" in letter:  # "Kp" of a description is the letter K_p
         doc = re.sub(rf"\b{letter.replace('_', '')}\b", letter, doc)
@@ -172,9 +172,9 @@ def checks_line(analysis: Analysis) -> Iterator[str]:
 
 
 def chart_pairs(analysis: Analysis, order: Order) -> list[tuple[str, str]]:
-    """Pairs of parameters to draw stability over: what can be changed first, then nearest edges.
+    """Pairs of parameters over which to draw stability: changeable ones first, then those with the nearest edges.
 
-    Of a slider two, each beside the stiffness; of a machine one, of what costs least; none if given by matrices.
+    Two pairs for a slider, each with the stiffness; one for a machine, of the cheapest changes; none with matrices.
     """
     told = [*changeable(analysis, order.adjustable), *(one for one in analysis.margins if one.edge is not None)]
     names = list(dict.fromkeys(one.parameter for one in told))
@@ -186,7 +186,7 @@ def chart_pairs(analysis: Analysis, order: Order) -> list[tuple[str, str]]:
 
 
 def charts_over(analysis: Analysis, order: Order) -> Iterator[str]:
-    """HTML charts of stability over the pairs that were asked for, else over `chart_pairs`."""
+    """HTML charts of stability over the pairs in `order.charts`, by default over `chart_pairs`."""
     rig = analysis.rig
     for x, y in order.charts or chart_pairs(analysis, order):
         over = " and ".join(said(rig, rig.resolve(name)) for name in (x, y))
@@ -207,7 +207,7 @@ def _chart_section(analysis: Analysis, order: Order) -> Iterator[str]:
 
 
 def formula_section(analysis: Analysis) -> Iterator[str]:
-    """HTML of the formula of the critical stiffness, if there is one, and of the equations of motion."""
+    """HTML of the formula of the critical stiffness, if one exists, and of the equations of motion."""
     printed: list[sp.Eq] = []
     try:
         whole, *parts = printed = formula_in_parts(analysis.rig)
@@ -223,7 +223,7 @@ def formula_section(analysis: Analysis) -> Iterator[str]:
 
 
 def motion_equations(rig: Slider | Machine, printed: Sequence[sp.Eq] = ()) -> Iterator[str]:
-    """HTML of the equations of motion, and of the letters in these and those `printed` before."""
+    """HTML of the equations of motion, and table of the letters in them and in the equations `printed` before."""
     if by_matrices(rig):
         yield paragraph("The equations of motion are matrices, too large to be printed.")
         return
@@ -243,7 +243,7 @@ def motion_equations(rig: Slider | Machine, printed: Sequence[sp.Eq] = ()) -> It
 
 
 def _along_axis(rig: Slider | Machine, model: Model) -> Iterator[sp.Eq]:
-    """Stiffness along the sliding direction of a rig whose file gives that along its axis."""
+    """Equation of the stiffness along the sliding direction, if the rig's stiffness is given along another axis."""
     if model.axial_share is not None:
         axial = sp.Symbol(rig.parameters()["slider.axial_stiffness"].role.letter)
         stiffness, share = (model.written(one) for one in (model.parameters["slider.stiffness"], model.axial_share))
@@ -251,7 +251,7 @@ def _along_axis(rig: Slider | Machine, model: Model) -> Iterator[sp.Eq]:
 
 
 def _is_used(equation: sp.Eq, others: Sequence[sp.Eq]) -> bool:
-    """False for the definition of a symbol that no other equation has."""
+    """False for an equation that defines a symbol which no other equation contains."""
     return not equation.lhs.is_Symbol or any(
         equation.lhs in one.rhs.free_symbols | one.lhs.free_symbols for one in others if one is not equation
     )

@@ -1,4 +1,4 @@
-"""Sections of a document for who ordered it: assumptions, tolerances and notes of inputs, motion, letters, laws."""
+"""Sections of documents: assumptions, tolerances and notes of inputs, motion, letters, laws."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ from steadyslip.reports.literature import METHOD, cited
 from steadyslip.verdict import Tolerated
 from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.judder import STEP, grown, motion_after
-from steadyslip.verdict.words import PACE, told_range
+from steadyslip.verdict.words import PACE, format_parameter_range
 
 CUT_SHORT = "too many steps"
-_NEARLY = 0.01  # share off steady sliding up to which a motion is told to slide steadily again
-SWINGS_DRAWN = 30  # swings in a figure 100 mm wide, 3 mm each: of more than twice as many only the last are drawn
-_LONGEST_UNIT = 12  # characters of a comment that may be a unit: N m s/rad has 9
+_NEARLY = 0.01  # relative deviation from steady sliding below which a motion counts as steady again
+SWINGS_DRAWN = 30  # swings in a figure 100 mm wide, 3 mm each; if there are twice as many, only the last are drawn
+_LONGEST_UNIT = 12  # most characters of a comment that is taken as a unit: N m s/rad has 9
 
 
 def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -> Iterator[str]:
-    """HTML of what the verdict takes for granted."""
+    """HTML of the assumptions behind a verdict, and its warnings."""
     yield heading("Assumptions")
     inertia = "with inertia" if has_structure(rig) or build_model(rig).inertial else "without inertia (quasistatic)"
     bodies = "structures move as their matrices say, other" if has_structure(rig) else ""
@@ -58,14 +58,14 @@ def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -
 
 
 def tolerances_of(found: Tolerated | None) -> dict[str, str]:
-    """Text of the tolerance of each parameter by name."""
+    """Text of the tolerance range of each parameter by name; empty for None."""
     return {} if found is None else {
-        one.parameter: told_range(found.rig, one.parameter, one.low, one.high) for one in found.alone
+        one.parameter: format_parameter_range(found.rig, one.parameter, one.low, one.high) for one in found.alone
     }  # fmt: skip
 
 
 def notes_of(text: str) -> dict[str, str]:
-    """Comments behind the values of a rig file by dotted name, empty where there is none, or a unit only.
+    """Comments on the values of a rig file by dotted name; empty text for no comment or only a unit.
 
     >>> notes_of("[friction]\\na = 0.01  # measured on B819\\nb = 0.02  # 1")
     {'friction.a': 'measured on B819', 'friction.b': ''}
@@ -85,7 +85,7 @@ def notes_of(text: str) -> dict[str, str]:
 
 
 def _is_unit(note: str) -> bool:
-    """True of a comment that only tells the unit of its value, such as ``1/m``."""
+    """True for a comment that is only a unit, such as ``1/m``."""
     try:
         return len(note) <= _LONGEST_UNIT and unit(note) is not None
     except QuantityError:
@@ -93,7 +93,7 @@ def _is_unit(note: str) -> bool:
 
 
 def _keys(table: Mapping[str, Any], before: str = "") -> Iterator[str]:
-    """Dotted names of the values of a table, in which tables of an array are counted from 1."""
+    """Dotted names of the values of a TOML table; items of arrays of tables are numbered from 1."""
     for key, value in table.items():
         many = isinstance(value, list) and all(isinstance(one, dict) for one in value)
         inner = {f"{key}.{n}": one for n, one in enumerate(value, 1)} if many else {key: value}
@@ -102,9 +102,9 @@ def _keys(table: Mapping[str, Any], before: str = "") -> Iterator[str]:
 
 
 def motion(analysis: Analysis, title: str = "The motion", source: str = "") -> Iterator[str]:
-    """HTML of the motion after a small disturbance: time history and phase plane with the cycle.
+    """HTML of the motion after a small disturbance: text, time history and phase plane.
 
-    Text of a file, `source`, tells whether it has a protocol, which is not what is shown.
+    `source` is the text of the rig file: if it has a protocol, a note says that this motion is not that protocol's.
     """
     yield heading(title)
     rig: Any = analysis.rig
@@ -145,9 +145,9 @@ def motion(analysis: Analysis, title: str = "The motion", source: str = "") -> I
 
 
 def _last_swings(run: History) -> History:
-    """A motion without what came before its last swings, if there are so many that they would fill a figure.
+    """Motion cut to its last `SWINGS_DRAWN` swings, if it has more than twice as many.
 
-    Swings are slip events, or without any the times at which a slip rate rises through its median.
+    Swings are slip events or, without any, the times at which a slip rate rises through its median.
     """
     times = [one.begin for one in run.slip_events]
     if not times:
@@ -166,7 +166,7 @@ def _last_swings(run: History) -> History:
 
 
 def _course(run: History, stable: bool | None) -> str:
-    """What a motion does in the phase plane, behind its name."""
+    """Clause for a caption on the course of a motion in the phase plane."""
     if run.status == BLOWN_UP:
         return ", which it leaves to the right"
     if run.status not in ("done", CUT_SHORT):
@@ -177,7 +177,7 @@ def _course(run: History, stable: bool | None) -> str:
 
 
 def _by_eigenvalues(analysis: Analysis) -> str:
-    """Sentence on what the eigenvalues of a structure tell of its motion; empty for other rigs."""
+    """Sentence on the motion of a rig with a structure by its eigenvalues; empty for other rigs."""
     leading = next(iter(analysis.eigenvalues), None)
     if not has_structure(analysis.rig) or leading is None or not leading.real:
         return ""
@@ -196,9 +196,9 @@ def _by_eigenvalues(analysis: Analysis) -> str:
 
 
 def _told(run: History, analysis: Analysis) -> str:
-    """What a run did: its slip events and its early end, or else how near it comes to steady sliding.
+    """Clause on a motion: slip events and early end, or else its final deviation from steady sliding.
 
-    What would mend such an end is left out: what to change is recommended elsewhere.
+    The message of an early end is given without its advice: the document has a recommendation.
     """
     if run.sentence and run.status == CUT_SHORT:
         return f"{run.sentence} (simulated for {format_quantity(run.end, 's')})"
@@ -221,12 +221,12 @@ def _told(run: History, analysis: Analysis) -> str:
 
 
 def _half_time(analysis: Analysis) -> str:
-    """Time in which the slowest small disturbance of a stable rig halves, in words."""
+    """Text of the time in which the slowest small disturbance of a stable rig halves."""
     return format_quantity(math.log(2) / abs(max(one.real for one in analysis.eigenvalues)), "s")
 
 
 def letters(rig: Slider | Machine, printed: Iterable[sp.Basic]) -> str:
-    """HTML table of the letters in printed equations that are not those of the inputs."""
+    """HTML table of the letters in printed equations that are not inputs."""
     model = build_model(rig)
     inputs = set(input_letters(model, rig).values())
     known = legend(model) | MEANINGS
@@ -243,9 +243,9 @@ def letters(rig: Slider | Machine, printed: Iterable[sp.Basic]) -> str:
 
 
 def input_letters(model: Model | None, rig: Slider | Machine) -> dict[str, str]:
-    """Letters of the inputs by dotted name: as the equations write them, or would if they were in them.
+    """Letters of the inputs by dotted name, as in the equations; also for inputs that enter no equation.
 
-    Those that several would share have the name of their member as a subscript.
+    Letters that several inputs would share have the name of their member as a subscript.
     """
     given = [name for name, one in rig.parameters().items() if one.value is not None]
     bare = {name: letter_of(rig, name) or name.rpartition(".")[2] for name in given}
@@ -262,12 +262,12 @@ def input_letters(model: Model | None, rig: Slider | Machine) -> dict[str, str]:
 
 
 def subscript_of(name: str) -> str:
-    """Subscript that the name of a member is in letters, of the dotted name of its parameter."""
+    """Subscript of letters for a member, from the dotted name of its parameter: its second part."""
     return name.split(".")[1].replace("-", "_")
 
 
 def references(*rigs: Slider | Machine, names: Sequence[str] = ()) -> Iterator[str]:
-    """HTML of the laws of rigs, which `names` tell apart, with what their descriptions cite, and of the method."""
+    """HTML of the laws of the rigs (labelled by `names`), the publications that these cite, and the method."""
     yield heading("References")
     rows: dict[tuple[str, str, str], list[str]] = {}
     for rig, name in zip(rigs, names or [""] * len(rigs), strict=True):

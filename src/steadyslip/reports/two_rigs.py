@@ -1,4 +1,4 @@
-"""Document about two rigs beside each other: which slides steadily, what decides it, what to change about either."""
+"""Document on two rigs side by side: verdicts, the differences that decide them, and recommended changes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _comparison(result: RigComparison) -> Parts:
 
 
 def _assumed(result: RigComparison) -> Iterator[str]:
-    """HTML of what the verdicts take for granted; what holds for one of them alone begins with its name."""
+    """HTML of the assumptions of both verdicts; those of one rig only begin with its name."""
     first, second = ([*assumptions(one.rig, one.warnings, VALIDITY)] for one in result.verdicts)
     yield from (part for part in first if part in second)
     for name, parts, others in zip(result.names, (first, second), (second, first), strict=True):
@@ -59,7 +59,7 @@ def _order(within: Tolerated | None) -> Order:
 
 
 def _answer(result: RigComparison) -> str:
-    """Sentences on what decides: differences that change the verdict alone, or the one with the largest part."""
+    """Sentences on the differences each of which alone changes the verdict, or on that with the largest part."""
     rig: Any = result.verdicts[0].rig
     if decisive := [worded(rig, text) for text in result.decisive()]:
         return f"{'; '.join(decisive)}."
@@ -74,7 +74,7 @@ def _answer(result: RigComparison) -> str:
 
 
 def _differences(result: RigComparison) -> Iterator[str]:
-    """HTML table of the differences, with what each is worth, and what a part is."""
+    """HTML table of the differences with the part of each, and an explanation of parts."""
     rig: Any = result.verdicts[0].rig
     a, b = result.names
     known = bool(result.measure)
@@ -101,7 +101,7 @@ def _differences(result: RigComparison) -> Iterator[str]:
 
 
 def _chart(result: RigComparison) -> str:
-    """HTML figure of both rigs, over a number that differs."""
+    """HTML figure of the distance of both rigs from the edge, over a parameter in which they differ."""
     a, b = result.names
     over = said(result.verdicts[0].rig, abscissa(result))
     words = f"How near {a} and {b} are to the edge of stability, over {over}; the marks are the rigs."
@@ -109,7 +109,7 @@ def _chart(result: RigComparison) -> str:
 
 
 def _with_words(rigs: Sequence[Any], cells: Sequence[str]) -> Iterator[str]:
-    """Cells of a row about two rigs, with a parameter at the beginning in words instead of by its path."""
+    """Cells of a row about two rigs, with dotted parameter names at their beginning replaced by words."""
     yield next((said(rig, cells[0]) for rig in rigs if cells[0] in rig.parameters()), cells[0])
     for rig, cell in zip(rigs, cells[1:], strict=True):
         name, _, rest = cell.partition(" ")

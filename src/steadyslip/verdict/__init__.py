@@ -1,6 +1,6 @@
-"""The verdict on one rig: gathers steady sliding, linear stability and edges, and says it in words.
+"""Verdict on one rig: steady sliding, linear stability and edges of stability, as numbers and as text.
 
-Knows no maps, figures or documents.
+Imports no maps, figures or documents.
 """
 
 from steadyslip.files.specifications.tolerance_tables import Adjustment, Tolerances, read_tolerances

@@ -1,4 +1,4 @@
-"""The verdict on a rig as users get it: `Findings`, with their text, data and figures."""
+"""`Analysis`, the result of `analyze`: `Findings` with methods that return text, JSON data, a formula and figures."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ class Analysis(Findings):  # noqa: D101 -- its base has it
         return linear_formula(self.rig, along)
 
     def plot(self, kind: str | None = None, **options: Any) -> Any:
-        """A figure: of a slider ``"locus"``, its root locus in the stiffness; of a machine ``"verdict"``, or of its
-        parts ``"ranges"``, ``"mode"`` and ``"eigenvalues"`` alone.
+        """Figure of the verdict: for a slider ``"locus"``, its root locus in the stiffness; for a machine ``"verdict"``
+        or one of its panels ``"ranges"``, ``"mode"`` and ``"eigenvalues"``.
         """
         return draw(self, kind, **options)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units, as ``--json`` prints it; of a slider per unit area, with an area forces as well."""
+        """Verdict as JSON-ready dict in SI units, as ``--json`` prints it; forces too if a slider has an area."""
         return as_dict(self)
 
     def to_json(self) -> str:
-        """`to_dict` as JSON text."""
+        """Verdict as JSON text: `to_dict` serialized."""
         return json.dumps(self.to_dict(), indent=2, allow_nan=False)
 
     def __str__(self) -> str:

@@ -55,16 +55,16 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
     ----------
     rig : Slider or Machine
     branch : int
-        Which steady sliding to judge where there are several, by rising normal stress.
+        Index of the steady sliding state to judge where several exist, in order of rising normal stress.
     kick : str or sequence of str
-        Kinds of kick, as for `steadyslip.threshold`, of which to find the smallest that is not survived; of machines
-        with the body or contact where it is, such as ``"force at table"``. On a terminal progress is shown; Ctrl-C
-        leaves the kinds that were not begun out.
+        Kinds of kick, as for `steadyslip.threshold`: for each the smallest kick that is not survived is found. For
+        machines with the body or contact that is kicked, such as ``"force at table"``. On a terminal progress is shown;
+        Ctrl-C skips the kinds that were not begun.
 
     Returns
     -------
     Analysis
-        With ``stable = None`` and the reason if steady sliding does not exist.
+        If steady sliding does not exist, ``stable`` is None and ``reason`` says why.
 
     Raises
     ------
@@ -98,9 +98,10 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
 
 
 class _Linear(NamedTuple):
-    """Linear stability of a rig at a `point`, by its equations or by its matrices.
+    """Linear stability of a rig at the operating point `point`, from its symbolic equations or from its matrices.
 
-    `numbers` are fields of `Analysis`; `edges` gives margins and their checks, `mode` that of an eigenvalue.
+    `numbers` are fields of `Analysis` by name. `edges()` returns margins and the checks of their edges; `mode(s)`
+    returns the mode of eigenvalue s (1/s).
     """
 
     point: Any
@@ -114,7 +115,7 @@ class _Linear(NamedTuple):
 
 def _by_equations(rig: Any, branch: int, steady: Any) -> _Linear:
     point = operating_point(rig, None, rig.kept_zeros(), branch)
-    numbers = linear_numbers(point)  # refuses what cannot be counted, before the edges are looked for
+    numbers = linear_numbers(point)  # raises NotAvailable before the costly search for edges
     edged = bool(on_edge(point)) or decided_by_rounding(point)
     return _Linear(
         point,
@@ -142,7 +143,7 @@ def _by_matrices(rig: Machine) -> _Linear:
 
 
 def _judged(rig: Any, branch: int, kicks: Sequence[str]) -> Analysis:
-    """Verdict on a rig by its equations or, where these would be too long, by its matrices: then without an onset."""
+    """Verdict from a rig's symbolic equations or, where these would be too long, from its matrices (then no onset)."""
     matrices = by_matrices(rig)
     states = steady_states(rig)
     if not 0 <= branch < len(states):
@@ -175,7 +176,7 @@ def _judged(rig: Any, branch: int, kicks: Sequence[str]) -> Analysis:
 
 
 def _explained(found: Analysis, states: Sequence[Any]) -> Analysis:
-    """The same with its reason and warnings; `states` are all steady states of the rig."""
+    """`found` with its reason and warnings filled in; `states` are all steady states of the rig."""
     if found.rig.in_forces:
         return replace(found, reason=machine.reason(found), warnings=tuple(machine.warnings(found, states)))
     edged = (ON_THE_EDGE,) if found.on_edge else ()
@@ -183,7 +184,7 @@ def _explained(found: Analysis, states: Sequence[Any]) -> Analysis:
 
 
 def _judged_by_response(rig: Any, kicks: Sequence[str]) -> Analysis:
-    """Verdict on a machine with a structure given by its measured response: the growing roots are counted."""
+    """Verdict on a machine with a structure given by its measured frequency response, from a count of growing roots."""
     if kicks:
         raise NotAvailable("kicks are not offered for a structure given by its measured response")
     found = measured_machine(rig)
@@ -200,7 +201,7 @@ def _judged_by_response(rig: Any, kicks: Sequence[str]) -> Analysis:
 
 
 def _leading_mode(rig: Machine, linear: _Linear) -> tuple[dict[str, Any], tuple[Check, ...]]:
-    """Fields `mode` and `origin` of the verdict, and the check of `origin`, which is None if that fails."""
+    """Fields `mode` and `origin` of a machine's verdict, and the check of `origin`, which is left None if it fails."""
     known = linear.numbers["growth_rate"] not in (math.inf, None)
     first = next(iter(linear.numbers.get("eigenvalues", ()) if known else ()), None)
     if first is None:
@@ -215,7 +216,9 @@ def _leading_mode(rig: Machine, linear: _Linear) -> tuple[dict[str, Any], tuple[
 
 
 def _onset(rig: Slider | Machine, distances: Sequence[Margin], branch: int) -> Onset | None:
-    """Onset at the nearest oscillatory edge: of a slider in stiffness (or gain kp), of a machine in any parameter."""
+    """Onset (kind of Hopf bifurcation) at the nearest oscillatory edge: in a slider's stiffness or gain kp, in any
+    parameter of a machine; None without an oscillatory edge.
+    """
     if rig.default_along is None:
         nearest = oscillatory_edge(distances)
         return None if nearest is None else onset_at(rig, nearest)
@@ -224,13 +227,13 @@ def _onset(rig: Slider | Machine, distances: Sequence[Margin], branch: int) -> O
     edges = [one for one in margin.edges if one.kind == "oscillatory" and one.stable != "neither"] if margin else []
     if margin is None or not edges:
         return None
-    with suppress(NotAvailable):  # with a delay
+    with suppress(NotAvailable):  # raised for rigs with a delay
         return onset_at(rig, edges_about(margin.value, edges)[0], branch)
     return None
 
 
 def _kicks(rig: Slider | Machine, kinds: Sequence[str], branch: int) -> tuple[Threshold, ...]:
-    """Thresholds of kicks given as text such as ``force at table``."""
+    """Thresholds of the kicks named in `kinds`, text such as ``force at table``; empty without any."""
     if not kinds:
         return ()
     from steadyslip.nonlinear.kicks.kicks import kick_problems

@@ -1,4 +1,8 @@
-"""Parts of the differences between two rigs in the change of their verdict: Shapley values over rigs between them."""
+"""Contribution of each difference between two rigs to the change of their verdict, as Shapley values.
+
+They are computed from verdicts on mixed rigs, which take some of the differing values from one rig and the rest from
+the other.
+"""
 
 from __future__ import annotations
 
@@ -19,19 +23,19 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 
-MOST_EXACT = 12  # differences of which every subset is judged, 4096 rigs; of more, subsets along drawn orders
-MOST_RIGS = 1024  # rigs that are built one by one, some milliseconds each, where laws or zeros differ
+MOST_EXACT = 12  # up to this many differences every subset is judged (4096 rigs); beyond, random orders are sampled
+MOST_RIGS = 1024  # most mixed rigs built one by one (some ms each), needed where laws or zeros differ
 IMPOSSIBLE = "not possible"
-ORDERS = 256  # drawn orders of the differences, each also reversed: the error of a share is some percent
+ORDERS = 256  # random orders of the differences, each also reversed: sampling error of a share is some percent
 
 Place = tuple[Differing, ...]
-"""What is changed together: one place, or the keys of which each rig has another (stiffness, axial_stiffness)."""
+"""Differences that are exchanged together: one, or two keys that exclude each other (stiffness, axial_stiffness)."""
 
 
 def comparable(first: Slider | Machine, second: Slider | Machine) -> tuple[Slider | Machine, Slider | Machine]:
-    """The two rigs in the same quantities, stresses or totals, in which their areas enter no equation.
+    """Both rigs expressed per unit area, or both as totals of the contact, so that their areas enter no equation.
 
-    Where areas differ, in those in which fewer values differ.
+    If their areas differ, whichever of the two forms leaves fewer differing values.
     """
     if first.area == second.area:
         return first, second
@@ -49,10 +53,10 @@ def _in_totals(rig: Slider | Machine) -> Slider | Machine:
 
 
 def places(first: Slider | Machine, second: Slider | Machine) -> tuple[Place, ...]:
-    """Places at which two comparable rigs differ and that enter their equations."""
+    """Differences between two comparable rigs that enter their equations, grouped as `Place`."""
     idle = {*first.not_in_model, *second.not_in_model}
     found: list[Place] = []
-    exchanged: dict[str, list[Differing]] = {}  # by table: given in one rig alone, and by a name of that table
+    exchanged: dict[str, list[Differing]] = {}  # by table: keys that only one of the rigs has
     for one in differing(first, second):
         if one.name in idle:
             continue
@@ -69,7 +73,9 @@ def places(first: Slider | Machine, second: Slider | Machine) -> tuple[Place, ..
 
 @dataclass(frozen=True)
 class Outcomes:
-    """Verdicts on m rigs, (m,): the words of `stability`, or ``not possible``; growth rate (1/s); k/k_cr; else NaN."""
+    """Verdicts on m rigs, each field (m,): word of `stability` or ``not possible``; growth rate (1/s) and safety factor
+    k/k_cr, NaN where unknown.
+    """
 
     words: Array
     growth: Array
@@ -78,12 +84,12 @@ class Outcomes:
 
 @dataclass(frozen=True)
 class Between:
-    """Rigs that have some of the differing values from one rig and the others from another.
+    """Mixed rigs: some of the differing values from a first rig, the others from a second.
 
     Attributes
     ----------
     first, second : Slider or Machine
-        Comparable.
+        As `comparable` returns them.
     places : tuple of Place
     """
 
@@ -92,7 +98,7 @@ class Between:
     places: tuple[Place, ...]
 
     def outcomes(self, masks: Array) -> Outcomes:
-        """Verdicts on the rigs with the second's values where `masks` (m, places) are True."""
+        """Verdicts on m mixed rigs, which have the second rig's values where `masks` (m, places) is True."""
         unknown = np.full(len(masks), math.nan)
         found = Outcomes(np.full(len(masks), IMPOSSIBLE, dtype=object), unknown, unknown.copy())
         built = np.array([not self._varies(place) for place in self.places], dtype=bool)
@@ -104,7 +110,7 @@ class Between:
                 rig = mixed(self.first, self.second, taken)
                 self._judge(rig, masks[rows], built, rows, found)
             except (ParameterError, NotAvailable):
-                continue  # such a rig cannot exist
+                continue  # this mixture is no valid rig: it stays `IMPOSSIBLE`
         return found
 
     def _judge(self, rig: Slider | Machine, masks: Array, built: Array, rows: Array, found: Outcomes) -> None:
@@ -125,30 +131,30 @@ class Between:
                 found.safety[rows] = own_safety_factor(point)
 
     def _varies(self, place: Place) -> bool:
-        """True if the place is a number that both rigs have, and none of them as zero: one model serves both."""
+        """True if the place is one number, nonzero in both rigs, so that one symbolic model serves both values."""
         (one, *more) = place
         plain = not more and one.role is not None and bool(one.first) and bool(one.second)
         return plain and one.name in self.first.parameters() and one.name in self.second.parameters()
 
 
 def shapley(between: Between, measure: str = "") -> tuple[str, Array]:
-    """Shapley value of every place in the change of a measure from the first rig to the second.
+    """Shapley value of every place: its contribution to the change of a measure from the first rig to the second.
 
-    The value of a place is the mean of what its change adds, over all orders in which the places can be changed (L. S.
-    Shapley, A value for n-person games, 1953); with more than `MOST_EXACT` places over drawn orders (J. Castro,
+    It is the mean change of the measure when that place is exchanged, over all orders in which places can be exchanged
+    (L. S. Shapley, A value for n-person games, 1953); with more than `MOST_EXACT` places over random orders (J. Castro,
     D. Gómez and J. Tejada, Computers & Operations Research 36, 2009). The values add up to the whole change.
 
     Parameters
     ----------
     between : Between
     measure : str
-        ``growth`` where parts of several pairs of rigs are to be of the same.
+        ``growth`` to force the growth rate, where the values of several pairs of rigs must have one measure.
 
     Returns
     -------
     measure : str
-        ``safety``: natural logarithm of k/k_cr, where all rigs between have one that tells their verdict; else
-        ``growth``: growth rate, 1/s; empty where some rig between has neither.
+        ``safety``: natural logarithm of k/k_cr, if for all mixed rigs k/k_cr > 1 means stable; else ``growth``:
+        growth rate, 1/s; empty if some mixed rig has neither.
     values : ndarray (places,)
     """
     count = len(between.places)
@@ -169,7 +175,7 @@ def shapley(between: Between, measure: str = "") -> tuple[str, Array]:
 
 
 def _measure(found: Outcomes, wanted: str) -> tuple[str, Array]:
-    """What tells the distance of all these rigs from the edge, the `wanted` if one is, and its value for each."""
+    """Measure (``safety``, ``growth`` or empty) that all mixed rigs have, and its values (m,); see `shapley`."""
     stable = found.words == WORDS[STABLE]
     if not np.all(stable | (found.words == WORDS[UNSTABLE])):
         return "", found.growth
@@ -192,19 +198,19 @@ def _exact(worth: Array, count: int) -> Array:
 
 
 def _orders(count: int, drawn_orders: int) -> Array:
-    """Drawn orders of the places and their reversals, (2 drawn_orders, count)."""
+    """Random orders of the places and their reversals, (2 drawn_orders, count)."""
     chance = np.random.default_rng(0)
     drawn = np.array([chance.permutation(count) for _ in range(drawn_orders)])
     return np.concatenate([drawn, drawn[:, ::-1]])
 
 
 def _prefixes(orders: Array) -> Array:
-    """Subsets on the way along each order, from none to all, as rows of bool (orders * (count + 1), count)."""
+    """Subsets of the first 0, 1, ..., count places of each order, as rows of bool (orders * (count + 1), count)."""
     count = orders.shape[1]
     rank = np.argsort(orders, axis=1)
     return np.asarray(rank[:, None, :] < np.arange(count + 1)[None, :, None]).reshape(-1, count)
 
 
 def ones_and_others(count: int) -> Array:
-    """Subsets of one place each, then of all but one each, (2 count, count)."""
+    """Subsets with a single place, then with all places but one, as rows of bool (2 count, count)."""
     return np.concatenate([np.eye(count, dtype=bool), ~np.eye(count, dtype=bool)])

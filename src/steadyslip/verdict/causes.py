@@ -1,7 +1,7 @@
-"""Sentences that explain stability at every stiffness, at none, or ill-posed equations (theory 3).
+"""Sentences that explain why a rig is stable at every stiffness, at none, or ill-posed (theory 3).
 
 With one memory variable the conditions of stability are a3 >= 0, a2 > 0, a0 > 0 and D k > N; a0 and D k > N are linear
-in the stiffness k, a2 and a3 do not contain it. A sentence is returned only where one condition alone decides.
+in the stiffness k; a2 and a3 do not depend on it. A sentence is returned only where a single condition decides.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def why_always_stable(analysis: Findings) -> str:
     known = _response(analysis)
     if known is None or known.B3 != 0:
         return ""
-    slope = known.S + known.mu * known.B1  # of the resistance in steady sliding, its normal stress included
+    slope = known.S + known.mu * known.B1  # d(steady resistance)/dV, with the change of normal stress
     if slope < 0:
         return ""
     parts = [word for word, is_in in (("dampings", _has_damping(analysis)), ("normal stress", known.B1 != 0)) if is_in]
@@ -52,7 +52,7 @@ def _has_damping(analysis: Findings) -> bool:
 
 @quietly
 def why_never_stable(analysis: Findings) -> str:
-    """Clause that names the condition which no stiffness meets; empty where no single condition explains it."""
+    """Clause that names the stability condition no stiffness meets; empty where no single condition explains it."""
     known = _response(analysis)
     if known is None:
         return _why_none_in_general(analysis)
@@ -61,12 +61,12 @@ def why_never_stable(analysis: Findings) -> str:
     _, _, a2, _ = coefficients(**numbers, k=k)
     if a2 <= 0:
         return ": friction and normal stress together feed every motion, whatever the stiffness (a2 > 0 fails)"
-    gain = float(analysis.rig.drive.proportional())  # acts as a spring, below which the stiffness cannot go
+    gain = float(analysis.rig.drive.proportional())  # acts as a spring: the least total stiffness
     if not _reachable(1 + known.mu * known.B2, -known.mu * known.B3, gain):
         return ": a disturbance grows without oscillating (static stability, a0 > 0, fails at every stiffness)"
     numerator, denominator = hopf_line(**numbers)
     if not np.isfinite(numerator) or not np.isfinite(denominator):
-        return ""  # products beyond floating point decide nothing
+        return ""  # overflow: cannot decide
     if _reachable(denominator, numerator, gain):
         return ": where no oscillation grows, a disturbance grows without oscillating"
     return f": a disturbance grows at every stiffness{_why_negative(known, denominator)}"
@@ -136,7 +136,7 @@ _SMALL = np.array([1e-3, 1e-6, 1e-9])  # masses relative to their natural sizes,
 
 
 def why_delay_is_ill_posed(point: OperatingPoint) -> str:
-    """Sentence on the delays which make a single rig ill-posed; empty where none does."""
+    """Sentence that names the delays that make the rig of a scalar `point` ill-posed; empty where none does."""
     if late_on_springs(point):
         return LATE_ON_SPRINGS
     delays = outweighing_delays(point)
@@ -145,10 +145,10 @@ def why_delay_is_ill_posed(point: OperatingPoint) -> str:
 
 @quietly
 def undecided_without_mass(rig: Rig, branch: int = 0) -> str:
-    """Why an ill-posed rig without delay is not judged: it is stable with masses, however small, where it has none.
+    """Reason not to judge an ill-posed rig without delay that any small mass, in place of a zero one, makes stable.
 
-    So are bristles without damping whose friction rises with velocity: nothing slows a change of velocity down at once,
-    yet the oscillation of a small mass on them decays at a rate that does not depend on the mass. Empty for others.
+    An example is bristles without damping whose friction rises with velocity: without mass nothing slows a change of
+    velocity; a small mass on them oscillates and decays at a rate that does not depend on the mass. Empty for others.
     """
     massless = [
         name for name, one in rig.parameters().items()
@@ -163,7 +163,7 @@ def undecided_without_mass(rig: Rig, branch: int = 0) -> str:
 
 @quietly
 def why_ill_posed(analysis: Findings) -> str:
-    """Sentence that explains why the equations are ill-posed: a delay, the effective mass, friction or the contact."""
+    """Sentence on why the equations are ill-posed: a delay, negative effective mass, friction or the contact law."""
     late = why_delay_is_ill_posed(operating_point(analysis.rig, branch=analysis.branch))
     if late:
         return late

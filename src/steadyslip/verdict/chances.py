@@ -1,4 +1,4 @@
-"""Chances of stable sliding for many rigs at once, each with tolerances about its own values."""
+"""Probability of stable sliding within tolerances, for many rigs at once."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from steadyslip.verdict.spreads import GROUPS, Spreads, spreads_of
 from steadyslip.verdict.tolerances import LOG2_CLOSED, LOG2_OTHERS, chance_of, log2_of
 
 K = TypeVar("K")
-PLACES = 5  # of each interval of one or two unknown parameters, ends among them; of more their corners
-AT_ONCE = 2**20  # rigs judged together; bounds memory
-LOG2_FEW, LOG2_FEWEST = 7, 4  # rigs of one group in searches: of one parameter, of two; fewer without closed form
+PLACES = 5  # values tried per interval, ends included, of one or two unknown parameters; of more only the ends
+AT_ONCE = 2**20  # rigs evaluated in one array operation; bounds memory
+LOG2_FEW, LOG2_FEWEST = 7, 4  # log2 of rigs per group in searches over one and two parameters
 
 
 @dataclass(frozen=True)
 class Chances:
-    """Chances of a rig and of those that differ from it in some values.
+    """Evaluates the probability of stable sliding of a rig, and of the rig with some values changed.
 
     Attributes
     ----------
     rig : Slider or Machine
     spreads : Spreads or None
-        None without tolerances: chances are 0 or 1.
+        Distributions of the parameters; None without tolerances: chances are then 0 or 1.
     sizes : tuple of int
-        Base-2 logarithms of the number of rigs of one group: of the whole sample, of few and of the fewest.
+        Base-2 logarithms of the rigs per group in `whole`, `few` and `fewest`.
     unknown : tuple of mapping of str to float
-        Values of parameters that are not known: chances are the least of these.
+        Sets of values of the parameters that are not known: a chance is the least over these sets.
     certain : bool
-        True if a chance is 1 only where all corners of the ranges are stable as well.
+        True if a chance counts as 1 only where all corners of the tolerance ranges are stable as well.
     """
 
     rig: Slider | Machine
@@ -50,7 +50,7 @@ class Chances:
 
     @property
     def single(self) -> bool:
-        """True without tolerances."""
+        """True without tolerances: a single rig is judged."""
         return self.spreads is None
 
     def own(self, name: str) -> float:
@@ -58,7 +58,7 @@ class Chances:
         return float(self.rig.parameters()[name].value or 0.0)
 
     def allowed(self, name: str, values: Array) -> Array:
-        """Mask of the values of a parameter whose tolerance stays inside its domain, and that the rig can have."""
+        """Mask (m,) of values (m,) of a parameter that the rig can have and whose tolerance stays inside its domain."""
         domain = self.rig.parameters()[name].role.domain
         spread = None if self.spreads is None else self.spreads.of.get(name)
         good = np.asarray(domain.contains(values), dtype=bool)
@@ -68,15 +68,15 @@ class Chances:
         return np.asarray(good & np.broadcast_to(valid_together(self.rig, "", {name: values}), values.shape))
 
     def few(self, changes: Mapping[str, Array]) -> Array:
-        """Chances of rigs with other values (m,), each from some thousand rigs."""
+        """Chances (m,) of the rig with changed values (m,) by name, each from some thousand sampled rigs."""
         return self._chances(changes, self.sizes[1])
 
     def fewest(self, changes: Mapping[str, Array]) -> Array:
-        """The same from some hundred rigs."""
+        """Chances (m,) as by `few`, each from some hundred sampled rigs."""
         return self._chances(changes, self.sizes[2])
 
     def whole(self, changes: Mapping[str, float]) -> tuple[float, float]:
-        """Chance of one rig with other values from the whole sample, and half-width of its 95 % interval."""
+        """Chance of the rig with changed values, from the whole sample, and half-width of its 95 % interval."""
         return min(self._whole({**one, **changes}) for one in self.unknown)
 
     def _whole(self, changes: Mapping[str, float]) -> tuple[float, float]:
@@ -106,11 +106,11 @@ class Chances:
         return np.asarray(np.all(stable | ~possible, axis=1))
 
     def _judged(self, changes: Mapping[str, Array], log2: int) -> tuple[Array, Array]:
-        """Whether each of n rigs about each of m values is stable, and whether it is possible, (m, n)."""
+        """Masks (m, n): stable, and possible, for n sampled rigs about each of the m changed values."""
         return self._of_shares(changes, None if self.spreads is None else self.spreads.shares(log2))
 
     def _of_shares(self, changes: Mapping[str, Array], shares: Mapping[str, Array] | None) -> tuple[Array, Array]:
-        """The same of rigs at shares of the values of each parameter."""
+        """`_judged` for rigs at given quantiles (`shares`, by name) of each parameter's distribution."""
         count = max((len(values) for values in changes.values()), default=1)
         size = 1 if shares is None else next(iter(shares.values())).size
         step = max(1, AT_ONCE // size)
@@ -121,7 +121,7 @@ class Chances:
         return np.concatenate([one for one, _ in parts]), np.concatenate([one for _, one in parts])
 
     def _part(self, changes: Mapping[str, Array], shares: Any, size: int) -> tuple[Array, Array]:
-        """The same for changes (m, 1)."""
+        """`_of_shares` for one block of changes, of shape (m, 1); `size` is the number n of rigs for each."""
         rows = max((len(values) for values in changes.values()), default=1)
         varied = {name: np.broadcast_to(values, (rows, size)) for name, values in changes.items()}
         for name, spread in () if self.spreads is None else self.spreads.of.items():
@@ -138,7 +138,7 @@ def chances_of(
     rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances,
     unknown: Mapping[str, tuple[float, float]] | None = None, certain: bool = False,
 ) -> Chances:  # fmt: skip
-    """Chances of a rig within tolerances, 0 or 1 where these are empty; the least over intervals of `unknown`."""
+    """`Chances` of a rig within tolerances, 0 or 1 where these are empty; the least over the intervals of `unknown`."""
     whole = log2_of(rig)
     few = {LOG2_CLOSED: (LOG2_FEW, LOG2_FEWEST), LOG2_OTHERS: (LOG2_FEW - 1, LOG2_FEWEST - 2)}.get(whole, (1, 0))
     sizes = (whole, *few)
@@ -148,12 +148,12 @@ def chances_of(
 
 
 def places(count: int) -> int:
-    """How many values of each unknown parameter are tried, where there are `count` of them."""
+    """Number of values tried of each of `count` unknown parameters."""
     return PLACES if count < 3 else 2
 
 
 def values_tried(unknown: Mapping[K, tuple[float, float]]) -> tuple[dict[K, float], ...]:
-    """Values of unknown parameters that are tried, every one with every other; a single empty one without any."""
+    """All combinations of the values tried of unknown parameters; one empty dict without unknown parameters."""
     share = np.linspace(0.0, 1.0, places(len(unknown)))
     rows = itertools.product(*(spread_over(*ends, share) for ends in unknown.values()))
     return tuple(dict(zip(unknown, map(float, row), strict=True)) for row in rows)

@@ -1,9 +1,9 @@
-"""Checks of every number of a verdict by a second, independent computation.
+"""Checks of each number of a verdict by a second, independent computation.
 
-- Steady sliding: the laws themselves, evaluated at its numbers, leave forces in balance and memory at rest.
-- Eigenvalues: the rig's characteristic matrix is singular there; the argument principle finds as many that grow.
+- Steady sliding: with the laws' own methods, forces balance and memory variables are constant.
+- Eigenvalues: the characteristic matrix is singular there; the argument principle counts as many growing ones.
 - Edges: small disturbances grow on one side and decay on the other.
-- Critical stiffness: a root lies on the imaginary axis there.
+- Critical stiffness: a root lies on the imaginary axis.
 
 A number that fails is left out of the verdict; the text about it begins with ``not decided``.
 """
@@ -37,40 +37,41 @@ from steadyslip.model.steady_results import SteadyMachine
 Array = NDArray[np.float64]
 
 BALANCE_TOLERANCE = 1e-8
-"""Allowed residual of steady sliding: of a stress relative to that stress, of a memory rate relative to its change
-with an e-fold of velocity, stress or memory. Chosen by trial: above rounding, below the effect of a wrong number."""
+"""Allowed residual of steady sliding: of a stress relative to that stress; of a memory rate relative to its change
+when velocity, stress or memory changes by a factor e. Chosen by trial: above rounding, below the effect of a wrong
+number."""
 SIDE_OFFSETS = (1e-7, 1e-5, 1e-9)
-"""Distances from an edge, relative to its value, at which both sides are checked, in this order, until they agree with
-the edge. Chosen by trial: too near, rounding decides; too far, another edge lies between."""
+"""Distances from an edge, relative to its value, at which stability on both sides is computed, in this order, until it
+agrees with the edge. Chosen by trial: too near, rounding decides; too far, another edge lies between."""
 FURTHER_OFFSETS = (1e-3, 1e-2)
-"""Distances tried then, where the equations become ill-posed, as roots under several delays are too many to be counted
-nearer to that, and where a root lies on the axis that the parameter hardly moves."""
+"""Larger distances, tried after `SIDE_OFFSETS` for ill-posed edges (with several delays, too many roots lie near them
+to be counted) and for edges at which the parameter hardly moves the root on the imaginary axis."""
 AXIS_TOLERANCE = 1e-6
 """Allowed distance of a root from the imaginary axis at the critical stiffness, relative to the size of the root.
-Chosen by trial, as `GOOD` is."""
+Chosen by trial, like `GOOD`."""
 
 DOUBLE_ROOT = 1e-6
-"""Real part of an eigenvalue over its size below which an undamped one counts as imaginary: rounding of the polynomial
-moves a double root by 1e-8; at the least of `SIDE_OFFSETS` growth is some 1e-5."""
+"""Ratio of real part to modulus below which an eigenvalue of an undamped rig counts as imaginary: rounding of the
+polynomial moves a double root by 1e-8; growth at the least of `SIDE_OFFSETS` is some 1e-5."""
 NEUTRAL = 4
-"""Status, beside those of `steadyslip.linear.status`, of undamped rigs of which no root grows."""
+"""Status of undamped rigs without a growing root; added to those of `steadyslip.linear.status`."""
 
-_TERMS = 3_000_000  # evaluated on the imaginary axis to count roots under delays beside edges: one to two seconds
+_TERMS = 3_000_000  # most terms evaluated on the imaginary axis to count roots of rigs with delays: one to two seconds
 _DECIDING = ("steady sliding", "growing roots")  # checks that must pass for a verdict
-_STEP = 1e-3  # change of ln velocity, ln stress and ln memory by which the typical size of a memory rate is found
-_ROUNDING = 8 * float(np.finfo(float).eps)  # relative, of velocity and memory after a few operations
+_STEP = 1e-3  # change of ln velocity, ln stress and ln memory used to find the typical size of a memory rate
+_ROUNDING = 8 * float(np.finfo(float).eps)  # relative rounding error of velocity and memory after a few operations
 _ZERO = 1e-9  # size of a root relative to the largest below which it counts as zero (rounding)
 
 
 def verdict_checks(
     rig: Rig, point: OperatingPoint, stable: bool, on_edge: bool, steady: SteadyMachine | None = None
 ) -> tuple[Check, ...]:
-    """Checks of steady sliding, of the eigenvalues and of how many grow; `steady` are a machine's printed forces."""
+    """Checks of steady sliding, eigenvalues and number of growing ones; `steady`: a machine's reported forces."""
     return (steady_check(rig, point, steady), *spectrum_checks(point, stable, on_edge))
 
 
 def undecided(checks: Sequence[Check]) -> str:
-    """Text that names the failed checks without which there is no verdict; empty where these passed."""
+    """Text that names the failed checks among those a verdict needs; empty where these passed."""
     failed = [str(one) for one in checks if not one.passed and one.what in _DECIDING]
     return UNDECIDED + "; ".join(failed) if failed else ""
 
@@ -79,7 +80,7 @@ def undecided(checks: Sequence[Check]) -> str:
 
 
 def steady_check(rig: Rig, point: OperatingPoint, steady: SteadyMachine | None = None) -> Check:
-    """Check that the laws, evaluated at steady sliding, give its stresses and constant memory, and bodies balance."""
+    """Check that laws evaluated at steady sliding return its stresses and zero memory rates, and forces balance."""
     laws = rig.laws_by_contact()
     frictions = [laws[contact.name].friction for contact in point.model.contacts]
     numbers = [float(one) for one in point.evaluate(_steady_numbers(point.model))]
@@ -95,7 +96,7 @@ def steady_check(rig: Rig, point: OperatingPoint, steady: SteadyMachine | None =
 
 
 def net_forces(rig: Rig, steady: SteadyMachine) -> dict[str, float]:
-    """Sum of forces of links and contacts on each coordinate, by name, relative to the largest force on it.
+    """Net force of links and contacts on each coordinate, by name, relative to the largest force on it.
 
     Coordinates on which a controller acts are left out: `steady` does not contain its force.
     """
@@ -119,7 +120,7 @@ def net_forces(rig: Rig, steady: SteadyMachine) -> dict[str, float]:
 
 @question
 def _steady_numbers(model: Model) -> ArrayFunction:
-    """Function that gives for each contact velocity, friction stress, normal stress by its contact law, and memory."""
+    """Function that returns for each contact: velocity, friction stress, normal stress by the contact law, memory."""
     found = []
     for contact in model.contacts:
         found += [model.steady[contact.velocity], model.steady[contact.friction], contact.steady_stress]
@@ -130,10 +131,10 @@ def _steady_numbers(model: Model) -> ArrayFunction:
 def _law_residuals(
     law: FrictionLaw, velocity: float, sigma: float, memory: tuple[float, ...], friction: float
 ) -> Iterator[tuple[float, float]]:
-    """Relative residuals of a friction law in steady sliding: of its stress, then of the rate of each memory.
+    """Relative residual and its tolerance, for a friction law's stress and then the rate of each memory variable.
 
-    Each with what is allowed: of a stress also what rounding of velocity and memory makes of it, as it does where
-    bristles are damped so much that rounding of their rate is felt.
+    The tolerance of the stress allows for rounding of velocity and memory, which shows where bristles are damped so
+    strongly that rounding of their rate matters.
     """
     v, s = abs(velocity), sp.Float(sigma)
 
@@ -157,34 +158,34 @@ def _law_residuals(
 
 
 def relative_errors(point: OperatingPoint) -> tuple[Array, NDArray[np.bool_]]:
-    """Relative error of each eigenvalue, and True where it is good enough for the verdict; both (n,).
+    """Relative error of each eigenvalue, and mask of those accurate enough to be reported; both (n,).
 
-    Eigenvalues that nearly coincide, or are zero, may have larger relative errors and still be reported, provided
-    that the whole spectrum is decided.
+    Eigenvalues that nearly coincide or are zero are reported even with larger errors if the whole spectrum is
+    `decided`.
     """
     found = checked_spectrum(point)
     size = np.abs(found.values)
     zero = np.where(size <= found.errors, _ZERO * np.max(size, initial=0.0), 0.0)
     with np.errstate(all="ignore"):
         share = found.errors / np.maximum(size, zero)
-        if is_neutral(point):  # a vanishing static stiffness proves a zero root better than any matrix does
+        if is_neutral(point):  # the static stiffness is 0: the zero root is exact
             share[size <= _ZERO * np.max(size, initial=0.0)] = 0.0
     return share, (share <= GOOD) | np.full(share.shape, found.decided)
 
 
 def spectrum_checks(point: OperatingPoint, stable: bool, on_edge: bool) -> tuple[Check, ...]:
-    """Checks of the eigenvalues and of how many grow; none where the equations are ill-posed."""
+    """Checks of the eigenvalues and of the number of growing ones; empty where the equations are ill-posed."""
     if is_ill_posed(point):
         return ()
     found, (share, good) = checked_spectrum(point), relative_errors(point)
     worst = float(np.max(share, initial=0.0)) if len(share) else math.inf
     values = check("eigenvalues", "least singular value of the rig's own matrix", worst, max(GOOD, worst * all(good)))
     how, growing = "argument along the imaginary axis", found.growing
-    if growing < 0 and len(share) and not point.model.delays:  # the argument left the range of floating point
+    if growing < 0 and len(share) and not point.model.delays:  # the argument principle overflowed
         how, growing = "conditions of Routh and Hurwitz", int(np.sum(found.values.real > 0))
     right = growing >= 0 and (on_edge or (growing == 0) == stable)
     counted = Check("growing roots", how, float(not right), 0.0, right)
-    none = found.complete and not len(share)  # no rightmost eigenvalue: infinitely many come near a line
+    none = found.complete and not len(share)  # no rightmost eigenvalue: infinitely many approach a vertical line
     return (counted,) if none else (values, counted)
 
 
@@ -204,7 +205,7 @@ def critical_check(point: OperatingPoint, stiffness: float, beta: float) -> Chec
 
 
 def missing_edges(names: Sequence[str], why: str) -> Iterator[Check]:
-    """One check, which fails, for parameters whose edges were not looked for; none without such parameters."""
+    """One failed check that names the parameters whose edges were not searched for; nothing if `names` is empty."""
     if names:
         how = f"{why}; steadyslip.boundary(rig, name) looks for one alone"
         yield Check(f"edges of {', '.join(names)}", how, np.inf, 0.0, False)
@@ -213,9 +214,9 @@ def missing_edges(names: Sequence[str], why: str) -> Iterator[Check]:
 def edge_checks(
     rig: Rig, margins: Sequence[Margin], missing: Sequence[str], branch: int
 ) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
-    """Margins without the edges that fail their check, and one check per edge: roots on both sides of it.
+    """Margins without the edges that fail their check, and the checks: roots on both sides of each edge.
 
-    One check more, which fails, names the parameters that are `missing` among the margins.
+    A failed check is added that names the parameters in `missing`, whose edges were not searched for.
     """
     edges = [(margin, edge) for margin in margins for edge in margin.edges]
     checks = list(missing_edges(missing, "too many roots under delays to be counted in time"))
@@ -224,13 +225,13 @@ def edge_checks(
     shares, touching = np.full(len(edges), np.inf), np.full(len(edges), np.inf)
     with at_most(_TERMS):
         posed = np.array([edge.kind != "ill-posed" for _, edge in edges])
-        # with several delays too many roots lie near an ill-posed edge to be counted: its sides are not asked
+        # with several delays too many roots lie near an ill-posed edge to be counted: `SIDE_OFFSETS` are skipped
         several = len(operating_point(rig, branch=branch).model.delays) > 1
         _find_sides(rig, edges, shares, SIDE_OFFSETS, branch, posed | (not several))
         lost = np.flatnonzero(np.isinf(shares) & posed)
         touching[lost] = _touching(rig, [edges[i] for i in lost], branch)
         slow = ~posed | ((touching <= AXIS_TOLERANCE) & (_room(edges) > max(FURTHER_OFFSETS)))
-        # with several delays one edge at a time, so that the work stays within `at_most`
+        # with several delays one edge at a time: `at_most` limits the work of each evaluation
         for some in np.eye(len(edges), dtype=bool)[slow] if several else (slow,):
             _find_sides(rig, edges, shares, FURTHER_OFFSETS[::-1] if several else FURTHER_OFFSETS, branch, some)
     lost = np.isinf(shares)
@@ -259,7 +260,7 @@ def _find_sides(
     branch: int,
     among: NDArray[np.bool_] | bool = True,
 ) -> None:
-    """Write into `shares` the first offset at which both sides of an edge agree with it, where none is known."""
+    """Fill `shares` (n,) where inf: the first of `offsets` at which stability on both sides agrees with the edge."""
     for share in offsets:
         rest = np.flatnonzero(np.isinf(shares) & among).tolist()
         if rest:
@@ -270,7 +271,9 @@ def _find_sides(
 
 
 def _room(edges: Sequence[tuple[Margin, Boundary]]) -> Array:
-    """Half the distance of each edge to the next of its parameter, relative to its value, (n,); inf for the only."""
+    """Half the distance of each edge to the nearest other edge of its parameter, relative to its value, (n,); inf
+    without another edge.
+    """
     names, values = np.array([edge.parameter for _, edge in edges]), np.array([edge.value for _, edge in edges])
     order = np.lexsort((values, names))
     gaps = np.where(names[order][1:] == names[order][:-1], np.diff(values[order]), np.inf)
@@ -280,14 +283,14 @@ def _room(edges: Sequence[tuple[Margin, Boundary]]) -> Array:
 
 
 def _sizes(edges: Sequence[tuple[Margin, Boundary]]) -> Array:
-    """Size of the value at each edge, (n,); of the rig's own where that is zero, or of the largest searched."""
+    """Scale of the parameter at each edge, (n,): |edge|; if that is 0 the rig's own value, or the largest searched."""
     return np.array([abs(edge.value) or abs(margin.value) or margin.searched[1] for margin, edge in edges])
 
 
 def _touching(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], branch: int) -> Array:
     """Distance of the rightmost root from the imaginary axis at each edge, relative to its size, (n,).
 
-    inf where the two sides of the edge differ in status: only an edge with equal sides merely touches the axis.
+    inf where stability differs between the two sides: a root that only touches the axis leaves them equal.
     """
     if not edges:
         return np.empty(0)
@@ -305,7 +308,7 @@ def _sides(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, bra
 
 
 def _rigs_beside(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, branch: int) -> OperatingPoint:
-    """Operating points `share` times the value of each of n edges below it, then those above, shape (2 n,)."""
+    """Operating points at `share` times the edge's value below each of n edges, then above each; shape (2 n,)."""
     values = np.array([edge.value for _, edge in edges])
     beside = values + share * _sizes(edges) * np.array([[-1.0], [1.0]])
     names = np.array([margin.parameter for margin, _ in edges])
@@ -320,7 +323,7 @@ def _rigs_beside(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: floa
 
 
 def _sides_agree(edge: Boundary, below: int, above: int) -> bool:
-    """True if the status below and above an edge agrees with its fields `stable` and `quiet`."""
+    """True if the status codes below and above an edge agree with its fields `stable` and `quiet`."""
     if UNKNOWN in (below, above):
         return False
     if edge.quiet:
@@ -331,7 +334,7 @@ def _sides_agree(edge: Boundary, below: int, above: int) -> bool:
 
 
 def _status_by_roots(point: OperatingPoint) -> NDArray[np.int64]:
-    """Status of rigs from their eigenvalues, (n,); independent of the Routh-Hurwitz conditions that scans use."""
+    """Status codes (n,) of rigs from eigenvalues, independent of the Routh-Hurwitz conditions used in searches."""
     if point.model.delays:
         grows = counts(point) != 0
     else:

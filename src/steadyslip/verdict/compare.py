@@ -1,4 +1,4 @@
-"""`compare_rigs`: the verdicts on two rigs beside each other, and which of their differences matter."""
+"""`compare_rigs`: verdicts on two rigs side by side, and how much each difference contributes to the change."""
 
 from __future__ import annotations
 
@@ -36,25 +36,27 @@ NONE = (None, None)
 
 @dataclass(frozen=True, eq=False)
 class RigComparison(Displayed):
-    """Two rigs beside each other.
+    """Verdicts on two rigs side by side, and the contribution of each difference between them.
 
     Attributes
     ----------
     names : tuple of str
     verdicts : tuple of Analysis
     within : tuple of Tolerated or None
-        Chances of stable sliding, of a rig with tolerances.
+        Verdicts within tolerances; None for a rig without tolerances.
     unknown : tuple of StableWithin or None
-        Values at which a rig is stable, of one with intervals of what is not known.
+        Values of its unknown parameters at which a rig is stable; None for a rig without unknown parameters.
     chances : tuple of ((float, float) or None)
-        Chance of a rig with tolerances and half-width of its 95 % interval, the least over what is not known.
+        Chance of stable sliding within tolerances and half-width of its 95 % interval, the least over the unknown
+        parameters; None for a rig without tolerances.
     alike : tuple of (str, str)
-        For every rig whether it is ``stable`` or ``unstable`` at all values of what is not known that were tried, or
+        Verdict on each rig: ``stable`` or ``unstable`` if so at all values tried of its unknown parameters, else
         ``not at every value``.
     differences : tuple of Difference
         The one with the largest part first; empty if the rigs have the same equations and numbers.
     measure : str
-        What the parts are of: ``safety``, ``growth``, or empty if rigs between the two have neither.
+        Quantity of which each difference has a part: ``safety`` (k/k_cr), ``growth`` (growth rate), or empty if
+        mixtures of the two rigs have neither.
     """
 
     names: tuple[str, str]
@@ -77,7 +79,7 @@ class RigComparison(Displayed):
         return "\n".join([*lines, "", *self._differences()])
 
     def side_by_side(self) -> Iterator[tuple[str, str, str]]:
-        """Rows of a table: what is told, and its text for either rig; the first row has the names."""
+        """Rows (label, text of first rig, text of second rig) of a table; the first row has the names."""
         yield ("", *self.names)
         for label, of in (
             ("k/k_cr", _ratio), ("growth rate", _growth), ("oscillation", _period), ("nearest edge", _edge),
@@ -95,7 +97,7 @@ class RigComparison(Displayed):
             yield "stable in", first, second
 
     def _unknown(self) -> Iterator[tuple[str, str, str]]:
-        """Rows on what is not known, of every parameter and of all at once."""
+        """Rows (label, first rig, second rig) on unknown parameters: each by itself, then all at once."""
         of = [{} if one is None else {each.parameter: each.told for each in one.each} for one in self.unknown]
         for name in {**of[0], **of[1]}:
             yield name, of[0].get(name, "known"), of[1].get(name, "known")
@@ -130,7 +132,7 @@ class RigComparison(Displayed):
         yield from self.decisive()
 
     def _alike(self) -> str:
-        """Sentence on rigs with the same equations and numbers."""
+        """Sentence for two rigs that do not differ in equations and numbers."""
         first, second = self.within
         same = ["equations", "numbers", *(["intervals of what is not known"] if any(self.unknown) else [])]
         if apart := differing_tolerances(first, second):
@@ -140,15 +142,15 @@ class RigComparison(Displayed):
 
     @property
     def of(self) -> str:
-        """What the parts are of, in words; empty if there are none."""
+        """`measure` in words; empty if there are no parts."""
         return {"safety": "k/k_cr", "growth": "the growth rate"}.get(self.measure, "")
 
     def part_in_words(self, one: Difference) -> str:
-        """Part of a difference as text, with its share of all."""
+        """Part of a difference as text, with its share of the sum of all parts."""
         return one.told(self.measure)
 
     def decisive(self) -> Iterator[str]:
-        """Sentences on the differences that decide the verdict alone."""
+        """Sentences on the differences each of which alone changes the verdict."""
         first, second = self.alike
         for name, word, unknown in zip(self.names, self.alike, self.unknown, strict=True):
             if word == PARTLY and unknown is not None:
@@ -171,11 +173,11 @@ class RigComparison(Displayed):
         )
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw how near the edge of stability both are; see `steadyslip.figures.two_rigs`."""
+        """Draw the distance of both rigs from the edge of stability; see `steadyslip.figures.two_rigs`."""
         return draw(self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units, as ``--json`` prints it."""
+        """Comparison as JSON-ready dict in SI units, as ``--json`` prints it."""
         rigs = [
             {
                 "name": name, "stable": one.stable, "reason": one.reason, "safety_factor": _factor(one),
@@ -211,23 +213,24 @@ def compare_rigs(
     tolerances: tuple[Mapping[str, Any] | Tolerances | None, Mapping[str, Any] | Tolerances | None] = NONE,
     names: tuple[str, str] = ("first", "second"),
 ) -> RigComparison:  # fmt: skip
-    """Verdicts on two rigs beside each other, and the part of each of their differences in the change.
+    """Verdicts on two rigs side by side, and the part that each of their differences has in the change.
 
     Parameters
     ----------
     first, second : Slider or Machine
     tolerances : (tolerances, tolerances), optional
-        Of the first and the second rig, as for `tolerate`. Those of files have intervals of what is not known as well:
-        parts and verdicts are then over values tried in these, of intervals that both have the same in both.
+        Of the first and the second rig, as for `tolerate`. Those read from files may have intervals of unknown
+        parameters: parts and verdicts are then over values tried in these; an interval common to both rigs is one
+        unknown, with equal values in both.
     names : (str, str), optional
-        What the rigs are called in the text.
+        Names of the rigs in the text.
 
     Returns
     -------
     RigComparison
-        Parts are Shapley values: the mean, over all orders in which the differences can be introduced one after
-        another, of what each changes. They are of the logarithm of k/k_cr where that tells the verdict of all sliders
-        between the two, else of the growth rate. Two sliders with different areas are compared in forces.
+        Parts are Shapley values: the mean change of a measure when a difference is introduced, over all orders of
+        introducing the differences one after another. The measure is the logarithm of k/k_cr if k/k_cr > 1 means stable
+        for all mixtures of the two rigs, else the growth rate. Sliders with different areas are compared in forces.
 
     Raises
     ------
@@ -285,7 +288,7 @@ def compare_files(
 
 
 def _check_slides(rigs: Iterable[Slider | Machine], names: Iterable[str]) -> None:
-    """Refuse rigs whose drive holds a place, by name."""
+    """Raise ParameterError that names the rigs whose drive holds a position (velocity 0)."""
     message = (
         "drive.velocity is 0, and verdicts on sliding are compared; give it a speed, such as '1 mm/min', and leave out "
         "what is of a held place alone, or ask `steadyslip hunt`, ss.hunt(rig) in Python, of either rig"
@@ -297,7 +300,7 @@ def _check_slides(rigs: Iterable[Slider | Machine], names: Iterable[str]) -> Non
 
 
 def _factor(one: Findings) -> float | None:
-    """k/k_cr of a slider, a gain counted with both; None where there is none."""
+    """k/k_cr of a slider, a parallel controller gain added to both; None for machines or without critical stiffness."""
     if one.rig.in_forces or one.steady is None:
         return None
     support = support_stiffness(one)
@@ -316,7 +319,7 @@ def _growth(one: Findings) -> str:
 
 
 def _oscillation(one: Findings) -> complex | None:
-    """Eigenvalue (1/s) of the leading mode if it oscillates, the one whose growth rate is told; None otherwise."""
+    """Eigenvalue (1/s) of the leading mode, whose growth rate is reported; None if it does not oscillate."""
     leading = one.eigenvalues[0] if one.eigenvalues else None
     return leading if leading is not None and leading.imag else None
 

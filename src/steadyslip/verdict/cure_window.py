@@ -1,4 +1,4 @@
-"""Values of one parameter at which a rig is stable with a chance that is asked for."""
+"""`Window`: values of one parameter at which a rig is stable with a required chance."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.written import WrittenAs, told_as
 from steadyslip.linear.nearness import doublings, ends_about
 
-LEAST = 1e-12  # smallest value searched over the largest, of a parameter that is zero
+LEAST = 1e-12  # smallest over largest value searched, of a parameter whose own value is 0
 
 
 @dataclass(frozen=True)
 class Window(Displayed):
-    """Values of one parameter at which the chance is reached, the others unchanged.
+    """Values of one parameter at which the required chance of stable sliding is reached, the others unchanged.
 
     Attributes
     ----------
@@ -22,11 +22,11 @@ class Window(Displayed):
     value : float
         The rig's own.
     windows : tuple of (float, float)
-        Rising; an end that is one of `limits` is no edge.
+        Intervals where the chance is reached, rising; an end equal to one of `limits` is no edge.
     limits : tuple of float
         Range that was searched.
     cost : float
-        Of the change to the nearest window; 0 inside one, infinite if there is none.
+        Cost of the change to the nearest window; 0 inside a window, infinite if there is none.
     """
 
     parameter: str
@@ -37,9 +37,9 @@ class Window(Displayed):
     cost: float
     area: float | None = field(default=None, repr=False)
     told: tuple[float, str] | None = field(default=None, repr=False)
-    """Factor and unit in which the values are told; those of `Rig.told`."""
+    """Factor from SI and unit in which the values are printed, as `Rig.told` returns them for 1."""
     written_as: WrittenAs = field(default=WrittenAs(), repr=False)
-    """How the rig's file writes the parameter."""
+    """Notation of the parameter in the rig's file, kept in printed values."""
     beyond: tuple[str, float] | None = None
     """Side (above, below) and value of an edge outside `limits`, beyond which the rig without tolerances is stable."""
 
@@ -52,7 +52,7 @@ class Window(Displayed):
 
     @property
     def leaves(self) -> float | None:
-        """Nearest edge of the window around the rig's own value; None if it is in none, or if that has no edge."""
+        """Nearest edge of the window around the rig's own value; None outside windows, or if the window has no edge."""
         return next(iter(self.edges_around), None)
 
     @property
@@ -62,7 +62,7 @@ class Window(Displayed):
         return ends_about(self.value, [end for ends in around for end in ends if end not in self.limits], self.unit)
 
     def doublings(self, to: float) -> float:
-        """How far a value is from the rig's own, by `steadyslip.linear.nearness`."""
+        """Distance of a value from the rig's own in doublings, by `steadyslip.linear.nearness`."""
         return float(doublings(self.value, to, self.unit))
 
     def __str__(self) -> str:
@@ -88,7 +88,7 @@ class Window(Displayed):
         return f"{first.removesuffix(f' {name}') if name else first} to {last}"
 
     def written(self, value: float, beside: float | None = None) -> str:
-        """Format a value in the unit of the rig's own, with digits that tell it from that, or from one `beside` it."""
+        """Format a value in the unit of the rig's own, with enough digits to differ from it, or from `beside`."""
         if 0 == self.limits[0] < value < LEAST * self.limits[1]:
             return "anything above 0"  # the edge is 0 itself, as for the damping of a machine that nothing damps yet
         factor, unit = self.told or (1.0, self.unit)

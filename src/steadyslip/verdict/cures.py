@@ -1,4 +1,4 @@
-"""`cure`: what to change about a rig so that it is stable with a chance that is asked for, and what it costs."""
+"""`cure`: parameter changes after which a rig is stable with a required chance, and what they cost."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ from steadyslip.verdict.export import finite
 from steadyslip.verdict.tolerances import GIVEN, format_chance
 from steadyslip.verdict.unknown import ValuesWithin, stable_within
 
-DECADES = 3.0  # searched to each side of a value without limits
-SCANNED, COARSE = 97, 17  # values along one parameter, and of each of a pair: by trial, time against windows missed
-FROM_ZERO = 145  # values of a parameter that is zero, over the twelve decades that `boundary` searches
-BESIDE = 1e-6  # relative distance from an edge of the rig itself at which the chance is looked at too
-HALVINGS, FEW_HALVINGS = 52, 12  # of a bracket: to the last digit of one rig, to 1e-5 of many
-NEAR = np.linspace(-0.02, 0.02, 5)  # relative places about an edge where the whole sample is judged
-FAR = math.log2(REMOTE)  # doublings beyond which no loss of stability is told
-PAIRS = 3  # cheapest pairs of the coarse search that are narrowed
-PRELOAD = "normal stress"  # kind of the parameters that press a contact, whatever a law calls them
+DECADES = 3.0  # decades searched to each side of a value without limits
+SCANNED, COARSE = 97, 17  # values along one parameter, along each of a pair: by trial, time against missed windows
+FROM_ZERO = 145  # values tried of a parameter that is 0, over the twelve decades that `boundary` searches
+BESIDE = 1e-6  # relative distance from an edge of the rig itself at which the chance is evaluated too
+HALVINGS, FEW_HALVINGS = 52, 12  # halvings of a bracket: to the last digit for one rig, to 1e-5 for a sample of rigs
+NEAR = np.linspace(-0.02, 0.02, 5)  # relative distances from an edge at which the whole sample is evaluated
+FAR = math.log2(REMOTE)  # doublings beyond which a loss of stability is not reported
+PAIRS = 3  # cheapest pairs of the coarse search that are refined
+PRELOAD = "normal stress"  # role kind of the parameters that press a contact, whatever their name in a law
 DESIGN = (
     ("stiffness", "axial_stiffness", "kp", "kv"), ("damping", "kd", "ki", "tn"), ("mass", "inertia"), (PRELOAD,),
     ("viscous",), ("velocity",),
 )  # fmt: skip
-"""What a designer chooses, in the order of asking: stiffness, damping, mass, preload, lubricant, speed."""
+"""Last parts of the names of parameters that a designer chooses, in the order they are tried."""
 OWN_VALUES = (
     "without tolerances this is of the rig's own values{}, whatever chance is asked for;\n"
     'its file takes them as stiffness = "12 ± 20 % N/um", or "12 +- 20 % N/um"'
@@ -56,34 +56,34 @@ SURE = Tested(
 
 @dataclass(frozen=True, eq=False)
 class Cures(ReadOnly):
-    """Changes of a rig after which it is stable with a chance that is asked for.
+    """Changes of a rig after which it is stable with a required chance.
 
     Attributes
     ----------
     rig : Slider or Machine
     sure : float
-        The chance that is asked for.
+        The required chance.
     chance, error : float
         Chance of the rig as it is, and half-width of its 95 % interval; 0 or 1 and 0 without tolerances.
     windows : tuple of Window
-        Of every adjustable parameter, in the order of the file or of `default_adjust`.
+        One for every adjustable parameter, in the order of the file or of `default_adjust`.
     pair : dict of str to float
-        Values of the two parameters whose change together costs least, SI units; empty if one alone costs no more, or
-        if no pair reaches it.
+        Values of the two parameters that, changed together, cost least, SI units; empty if a single change costs no
+        more, or if no pair reaches the chance.
     pair_cost : float
-        Infinite if `pair` is empty.
+        Cost of `pair`; infinite if it is empty.
     fails : tuple of Window
-        For a rig with enough chance as it is: of every parameter whose change would lose it, that first which needs the
-        smallest.
+        For a rig that has the chance as it is: one for every parameter whose change would lose it, the smallest such
+        change first.
     unlisted : tuple of Window
-        Where nothing that is listed reaches the chance: of what a designer chooses besides, in the order of
-        `default_adjust`.
+        If no adjustable parameter reaches the chance: one for every other parameter that a designer chooses, in the
+        order of `default_adjust`.
     without_tolerances : bool
-        True if nothing of the rig varies: what is told is then of the rig itself, whatever chance is asked for.
+        True if nothing of the rig varies: results are then for the rig's own values, whatever chance is required.
     unknown : tuple of ValuesWithin
-        Parameters whose values are not known, at all of which the chance is reached.
+        Parameters that are not known; the chance is reached at all their values.
     ranges : dict of str to (float, float)
-        Tolerances: least and largest value by dotted name, SI units; of normal distributions where 95 % lie.
+        Tolerances: least and largest value by dotted name, SI units; for normal distributions the range of 95 %.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -122,12 +122,12 @@ class Cures(ReadOnly):
         return "\n".join([*lines, *rows])
 
     def losses(self) -> dict[Window, list[float]]:
-        """Of a rig with enough chance the parameters whose change would lose it, with the values that are not far."""
+        """Windows of the parameters whose change would lose the chance, with their edges within `FAR` doublings."""
         near = {one: [end for end in one.edges_around if one.doublings(end) <= FAR] for one in self.fails}
         return {one: ends for one, ends in near.items() if ends}
 
     def sentences(self) -> list[str]:
-        """Lines on what is asked for, on what it holds for, and on the cheapest changes, without those by parameter."""
+        """Lines on the required chance, its conditions and the cheapest changes, without the rows by parameter."""
         wanted = f"stable with a chance of {format_percent(self.sure)}" if self.error else "stable"
         now, tried = self._now(), places(len(self.unknown))
         alone = [f"at every value of {one.parameter} from {one.given}, {tried} of them tried" for one in self.unknown]
@@ -152,14 +152,14 @@ class Cures(ReadOnly):
         return lines
 
     def _now(self) -> str:
-        """Chance or verdict of the rig as it is, of unknown values the least."""
+        """Chance or verdict of the rig as it is, as text; with unknown parameters the least."""
         if self.error:
             return format_chance(self.chance, self.error) + (" where least" if self.unknown else "")
         own = stability(self.rig)
         return "stable at some of these values only" if self.unknown and self.chance < 1 and own == "stable" else own
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units, as ``--json`` prints it."""
+        """Changes as JSON-ready dict in SI units, as ``--json`` prints it."""
 
         def data(one: Window) -> dict[str, Any]:
             return {
@@ -192,7 +192,7 @@ def cure(
     rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances | None = None, *, sure: float | str = 0.95,
     adjust: Mapping[str, Any] | None = None, unknown: Mapping[str, tuple[float, float]] | None = None,
 ) -> Cures:  # fmt: skip
-    """Find what to change about a rig so that it is stable with a given chance.
+    """Find changes of parameters after which a rig is stable with a required chance.
 
     Parameters
     ----------
@@ -202,13 +202,13 @@ def cure(
     sure : float or str
         The chance, such as ``"95 %"``.
     adjust : mapping of str to Adjustment, optional
-        What may be changed; by default that of `tolerances`, or else what a designer chooses: gains of the drive,
-        stiffness, damping, mass, preload, lubricant and speed, within three decades to each side. Each doubling costs
-        1 of a part, 1/4 of a setting of the drive, 4 of the speed (`steadyslip.verdict.change_costs`), unless a cost
-        is given.
+        Parameters that may change; by default those of `tolerances`, or else what a designer chooses: gains of the
+        drive, stiffness, damping, mass, preload, lubricant and speed, within three decades to each side. Each doubling
+        costs 1 for a part, 1/4 for a setting of the drive, 4 for the speed (`steadyslip.verdict.change_costs`), unless
+        a cost is given.
     unknown : mapping of str to (float, float), optional
         Least and largest value of parameters that are not known, SI units; by default those of `tolerances`. The chance
-        is to be reached at all values: five of each interval are tried, of more than two parameters the ends.
+        must be reached at all values: five of each interval are tried, with more than two parameters the ends.
 
     Returns
     -------
@@ -263,7 +263,7 @@ def _share(sure: float | str) -> float:
 
 
 def default_adjust(rig: Slider | Machine) -> dict[str, Adjustment]:
-    """What a designer chooses about a rig, what costs least first, in the order of `DESIGN`."""
+    """Parameters that a designer chooses, cheapest kind first, then as in `DESIGN`; all with default limits."""
     found = {}
     for words in DESIGN:
         for name, one in rig.parameters().items():
@@ -275,13 +275,13 @@ def default_adjust(rig: Slider | Machine) -> dict[str, Adjustment]:
 
 
 def _unlisted(chances: Chances, listed: Mapping[str, Adjustment], sure: float) -> tuple[Window, ...]:
-    """Windows of what a designer chooses and is not listed, of those that reach the chance alone."""
+    """Windows of the parameters that a designer chooses and that are not `listed`."""
     besides = [(name, one) for name, one in default_adjust(chances.rig).items() if name not in listed]
     return tuple(_windows(chances, name, one, sure) for name, one in besides)
 
 
 def _limits(chances: Chances, name: str, one: Adjustment) -> tuple[float, float]:
-    """Range of a parameter that is searched, within its domain; SI units."""
+    """Range of a parameter to search, within its domain and the limits of `one`; SI units."""
     value, domain = chances.own(name), chances.rig.parameters()[name].role.domain
     ends = sorted((value * 10.0**-DECADES, value * 10.0**DECADES))
     if not value:
@@ -296,7 +296,7 @@ def _limits(chances: Chances, name: str, one: Adjustment) -> tuple[float, float]
 
 
 def _scan(chances: Chances, name: str, limits: tuple[float, float]) -> Array:
-    """Values of a parameter to try, rising: its own, evenly on a log scale between the limits, beside its edges."""
+    """Values of a parameter to try, rising: its own, values spread evenly between the limits, and beside its edges."""
     low, high = limits
     own = chances.own(name)
     if low * high > 0:
@@ -316,7 +316,7 @@ def _scan(chances: Chances, name: str, limits: tuple[float, float]) -> Array:
 
 
 def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Window:
-    """All windows of one parameter."""
+    """`Window` of one parameter: all intervals in which the chance `sure` is reached."""
     low, high = _limits(chances, name, one)
     values = _scan(chances, name, (low, high))
     unit, about = (
@@ -330,7 +330,7 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
         return np.asarray(chances.few({name: at}) >= sure)
 
     inside = reached(values)
-    sharp = chances.single or chances.certain  # decided by single rigs, at the corners of the ranges
+    sharp = chances.single or chances.certain  # no sampling error: edges are sharp
     at = np.flatnonzero(inside[1:] != inside[:-1])
     edges = _narrowed(reached, values[at], values[at + 1], inside[at], HALVINGS if sharp else FEW_HALVINGS)
     edges = edges if sharp else np.array([_settled(chances, name, edge, sure) for edge in edges])
@@ -353,7 +353,7 @@ def _unit_cost(name: str, one: Adjustment) -> float:
 
 
 def _beyond(chances: Chances, name: str, limits: tuple[float, float]) -> tuple[str, float] | None:
-    """Side and value of the nearest edge outside the limits beyond which the rig itself is stable."""
+    """Nearest edge outside the limits beyond which the rig itself is stable: its stable side and value; else None."""
     try:
         edges = boundary(chances.rig, name)
     except (NotAvailable, ParameterError):
@@ -365,7 +365,7 @@ def _beyond(chances: Chances, name: str, limits: tuple[float, float]) -> tuple[s
 
 
 def _narrowed(reached: Callable[[Array], Array], low: Array, high: Array, first: Array, halvings: int) -> Array:
-    """Values inside of edges between `low` and `high`, on the side that is reached; `first`: whether `low` is it."""
+    """Bisect brackets `low`, `high` (n,) of edges: the last values that reach the chance; `first` where `low` does."""
     if not low.size:
         return low
     low, high = low.copy(), high.copy()
@@ -378,7 +378,7 @@ def _narrowed(reached: Callable[[Array], Array], low: Array, high: Array, first:
 
 
 def _settled(chances: Chances, name: str, edge: float, sure: float, others: Mapping[str, float] | None = None) -> float:
-    """The edge by the whole sample, from chances at places about it; the edge itself where they do not straddle it.
+    """Edge refined with the whole sample, by interpolating chances near it; `edge` if these do not bracket `sure`.
 
     `others` are changed values of other parameters.
     """
@@ -393,7 +393,7 @@ def _settled(chances: Chances, name: str, edge: float, sure: float, others: Mapp
 
 
 def _fails(chances: Chances, windows: Sequence[Window], sure: float) -> tuple[Window, ...]:
-    """Windows of all parameters whose change would lose the chance, the smallest change first."""
+    """Windows of all parameters whose change would lose the chance `sure`, the smallest change first."""
     known = {one.parameter: one for one in windows}
     names = [
         name
@@ -408,7 +408,9 @@ def _fails(chances: Chances, windows: Sequence[Window], sure: float) -> tuple[Wi
 def _cheapest_pair(
     chances: Chances, windows: Sequence[Window], adjust: Mapping[str, Adjustment], sure: float, least: float
 ) -> tuple[dict[str, float], float]:
-    """Values of the two parameters that reach the chance at the least cost, if that is below `least`; and the cost."""
+    """Cheapest change of two parameters that reaches the chance: values by name, and cost; empty and inf unless the
+    cost is below `least`.
+    """
     found: list[tuple[float, str, str, float, float]] = []
     for first, second in itertools.combinations(windows, 2):
         found += _coarse(chances, first, second, adjust, sure, least)
@@ -429,7 +431,7 @@ def _cost(chances: Chances, adjust: Mapping[str, Adjustment], name: str, to: Arr
 def _coarse(
     chances: Chances, first: Window, second: Window, adjust: Mapping[str, Adjustment], sure: float, least: float
 ) -> Iterator[tuple[float, str, str, float, float]]:
-    """The cheapest pair on a coarse grid: cost, names, values."""
+    """Cheapest change of two parameters on a coarse grid: cost, both names, both values; nothing if none is enough."""
     grids = []
     for one in (first, second):
         low, high = one.limits
@@ -456,13 +458,13 @@ def _refined(
     adjust: Mapping[str, Adjustment],
     sure: float,
 ) -> Iterator[tuple[dict[str, float], float]]:
-    """Pairs on the edge between the rig and a pair that reaches the chance, with their costs."""
+    """Cheaper values of a pair, on the edge between the rig's own values and those in `to`, and their cost."""
     one, two = names
     own, own_two = chances.own(one), chances.own(two)
     values = np.geomspace(own, to[0], COARSE) if own * to[0] > 0 else np.linspace(own, to[0], COARSE)
     values = values[chances.allowed(one, values)]
     low = np.full(values.size, own_two)
-    step = math.sqrt(to[1] / own_two) if own_two * to[1] > 0 else 1.0  # beyond what few rigs said was enough
+    step = math.sqrt(to[1] / own_two) if own_two * to[1] > 0 else 1.0  # margin: `to` was enough for a small sample only
     high = np.full(values.size, min(max(to[1] * step, limits[0]), limits[1]))
 
     def reached(at: Array) -> Array:

@@ -41,13 +41,13 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
 
 
 def _steady(steady: SteadySliding | SteadyMachine) -> dict[str, Any]:
-    """Steady sliding as data: its fields, without the units of a slider's states and its area."""
+    """Steady sliding as dict of its fields, for a slider without `units` and `area`."""
     data = asdict(steady)
     return data if isinstance(steady, SteadyMachine) else {name: data[name] for name in data if name not in _UNITS}
 
 
 def _of_machine(analysis: Findings) -> dict[str, Any]:
-    """Rows of a machine alone: its leading mode, and why it grows."""
+    """Entries for machines only: the leading mode, and why it grows."""
     return {
         "mode": analysis.mode and analysis.mode.to_dict(),
         "why_it_grows": analysis.origin and analysis.origin.to_dict(),
@@ -55,7 +55,7 @@ def _of_machine(analysis: Findings) -> dict[str, Any]:
 
 
 def _of_slider(analysis: Findings) -> dict[str, Any]:
-    """Rows of a slider alone: critical and stable stiffnesses."""
+    """Entries for sliders only: critical and stable stiffnesses."""
     return {
         "critical_stiffness": analysis.critical_stiffness,
         "critical_side": analysis.critical_side,
@@ -67,7 +67,7 @@ def _of_slider(analysis: Findings) -> dict[str, Any]:
 
 
 def _held_by(analysis: Findings) -> dict[str, Any]:
-    """Row ``held_by`` for a slider that a controller gain supports without a spring; empty otherwise.
+    """Entry ``held_by`` for a slider that a controller gain supports without a spring; empty otherwise.
 
     The critical and stable stiffnesses of the verdict then refer to a spring added beside that gain.
     """
@@ -157,7 +157,7 @@ def _edges(margin: Margin, area: float | None) -> list[dict[str, Any]]:
 
 
 def _forces(analysis: Findings, area: float) -> dict[str, Any]:
-    """The main results for the whole contact area: N and N/m."""
+    """Main results for the whole contact `area` (m²): forces (N) and stiffnesses (N/m)."""
     steady = analysis.steady
     return {
         "area": area,

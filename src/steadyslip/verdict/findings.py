@@ -1,4 +1,4 @@
-"""What an analysis found, as one frozen data class, from which texts, JSON and figures are made."""
+"""`Findings`: all results of an analysis, as a frozen data class from which texts, JSON and figures are made."""
 
 from __future__ import annotations
 
@@ -29,54 +29,54 @@ class Findings(Displayed):
     stable : bool or None
         Whether small disturbances of steady sliding die out; None if steady sliding does not exist.
     reason : str
-        Why, in one sentence; of a machine without steady sliding, which contact locks up or lifts off.
+        Explanation in one sentence; without steady sliding, which contact of a machine locks up or lifts off.
     steady : SteadySliding, SteadyMachine or None
     eigenvalues : tuple of complex
-        1/s, by falling real part; with a delay the rightmost.
+        Eigenvalues in 1/s, by falling real part; with a delay only the rightmost.
     characteristic_polynomial, routh : tuple of float
         Coefficients, lowest power first (theory 3: a0, a1, ...); first column of the Routh array, stable if all are
-        positive. Empty with a delay, for then it is none, and where equations are matrices.
+        positive. Empty with a delay (no polynomial then) and for machines given by matrices.
     characteristic_terms : tuple of (float, tuple of float)
-        With a delay: delays (s) and the polynomials that stand before exp(−s delay), that without delay first.
+        With a delay: each delay (s) and the polynomial that multiplies exp(−s delay), delay 0 first.
     unstable_roots : int or None
-        With a delay, or a structure given by its measured response: how many eigenvalues grow.
+        Number of growing eigenvalues, for rigs with a delay or with a structure given by its measured response.
     growth_rate : float or None
         Largest real part (1/s), inf if ill-posed.
     period : float or None
-        Of the least damped oscillation (s).
+        Period of the least damped oscillation (s).
     damping_ratio : float or None
-        Of that oscillation; negative if it grows.
+        Damping ratio of the least damped oscillation; negative if it grows.
     time_to_halve, time_to_double : float or None
-        Of the slowest decay, or of the fastest growth (s).
+        Time (s) in which the slowest decay halves, or the fastest growth doubles, a disturbance.
     on_edge : bool
-        Whether the rig is on the edge of stability to within rounding: then neither verdict should be relied on.
+        True if the rig is on the edge of stability to within rounding: then neither verdict should be relied on.
     undamped : bool
-        Whether nothing damps a machine, its friction included: then no disturbance dies out, and edges are of growth.
+        True if nothing damps a machine, not even friction: no disturbance dies out, and edges are where one grows.
     margins : tuple of Margin
         Distance of each parameter to its nearest edge, the most critical first.
     onset : Onset or None
         Kind of onset at the nearest oscillatory edge: of a slider in stiffness, of a machine in any parameter.
     kicks : tuple of Threshold
-        Smallest kicks that are not survived, where asked for.
+        Smallest kicks that are not survived, of the kinds requested.
     critical_stiffness : float or None
-        Of a slider: edge of the stable set nearest to its own stiffness (Pa/m along the sliding direction).
+        For a slider: edge of the stable set nearest to its own stiffness (Pa/m along the sliding direction).
     critical_side : str or None
-        ``above`` or ``below``: where, next to that edge, sliding is stable.
+        ``above`` or ``below``: side of the critical stiffness on which sliding is stable.
     critical_angular_frequency : float or None
-        Of the oscillation at the critical stiffness (rad/s), 0 if it does not oscillate.
+        Angular frequency at the critical stiffness (rad/s); 0 without oscillation.
     critical_axial_stiffness : float or None
-        The same edge as stiffness along the axis of spring, rod or press, where the rig gives one (Pa/m).
+        Critical stiffness along the axis of spring, rod or press, for rigs with an axial stiffness (Pa/m).
     stable_stiffness : tuple of (float, float)
-        Of a slider: all stable stiffnesses k > 0 as open intervals (Pa/m); the upper end may be inf.
+        For a slider: all stable stiffnesses k > 0 as open intervals (Pa/m); the upper end may be inf.
     mode : Mode or None
-        How a machine moves in the mode that grows fastest, or decays slowest.
+        Leading mode of a machine: that which grows fastest, or decays slowest.
     origin : Origin or None
-        Why that mode grows: what feeds it, and which modes couple. None if it is no oscillation that grows.
+        Why the leading mode grows: what feeds it, and which modes couple. None unless it is a growing oscillation.
     branch : int
-        Which steady sliding is judged.
+        Index of the steady sliding state that is judged.
     warnings : tuple of str
     checks : tuple of Check
-        The second question that was asked of each number. What failed is left out; a verdict that failed has
+        Second, independent computation of each number. Numbers that fail are left out; a verdict that fails has
         ``stable = None`` and a reason that begins with ``not decided``.
     """
 
@@ -118,10 +118,10 @@ class Findings(Displayed):
 
     @cached_property
     def judders(self) -> str:
-        """What an unstable rig does instead, such as "judders: every 4.92 s it sticks, then slips 33.2 um ...".
+        """Motion of an unstable rig in words, such as "judders: every 4.92 s it sticks, then slips 33.2 um ...".
 
-        From a simulation after a small disturbance, of bounded work. Empty for a stable rig, and where slip events were
-        not found to repeat themselves.
+        From a simulation after a small disturbance, of bounded work. Empty for a stable rig, and if the simulation
+        found no regular motion within that work.
         """
         from steadyslip.verdict.judder import judder_sentence
 
@@ -130,7 +130,7 @@ class Findings(Displayed):
 
     @cached_property
     def unstable_loop(self) -> str:
-        """Clause on a controller that is unstable without any friction, with what to change; empty for others."""
+        """Clause on a controller that is unstable even without friction, and what to change; empty otherwise."""
         from steadyslip.nonlinear.hunting.free_loop import unstable_by_itself
 
         return unstable_by_itself(self.rig) if self.stable is False and not self.on_edge else ""

@@ -1,4 +1,4 @@
-"""What a rig does that does not slide steadily: its motion after a small disturbance, until slip events repeat."""
+"""Motion of an unstable rig after a small disturbance: simulated until its slip events repeat, then put in words."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ from steadyslip.motion.sentence import (
 from steadyslip.motion.status import BLOWN_UP, LOST
 from steadyslip.protocol import VelocityStep
 
-STEP = 1.1  # factor by which the drive is faster for a while: small, yet above what rounding makes of steady sliding
+STEP = 1.1  # factor on the drive's speed while it disturbs: small, yet above rounding of steady sliding
 PERIODS = 12  # length of the first run in periods of the leading disturbance, so that its growth is seen
-BEGIN, END = 0.05, 0.1  # shares of the first run between which the drive is faster
-LONGER = 4.0  # length of a run over that of the run before
+BEGIN, END = 0.05, 0.1  # fractions of the first run between which the drive is faster
+LONGER = 4.0  # ratio of the lengths of successive runs
 MOST_STEPS = 300_000  # integration steps of a run: some tenths of a second
-MOST_TERMS = 300  # entries of structures' matrices up to which code is compiled within some seconds
-FEWEST = 8  # events in the second half of a run from which it is told that they have no trend
-TURNS = 0.25  # share of these, by trial, at which slips of irregular events turn from growing to shrinking or back
+MOST_TERMS = 300  # most entries of structures' matrices for which code compiles within some seconds
+FEWEST = 8  # fewest events in the second half of a run needed to conclude that their slips have no trend
+TURNS = 0.25  # least fraction, by trial, of irregular events at which slips turn from growing to shrinking or back
 ENDINGS = {LOST: ", until contact is lost after {time}", BLOWN_UP: ", until it runs away after {time}"}
-"""How a motion ends, by its status, with the time since the disturbance."""
+"""Clause on the end of a motion, by `History.status`; {time} is counted from the disturbance."""
 
 
 def _first(eigenvalues: Sequence[complex]) -> float:
-    """Length of the first run, s; NaN without a rate of disturbances."""
+    """Length of the first run, s; NaN if no eigenvalue sets a time scale."""
     leading = next((s for s in eigenvalues if s.imag > 0), next(iter(eigenvalues), None))
     if leading is None or not 0 < abs(leading) < math.inf:
         return math.nan
@@ -54,9 +54,9 @@ def _first(eigenvalues: Sequence[complex]) -> float:
 def motion_after(
     rig: Slider | Machine, eigenvalues: Sequence[complex], branch: int = 0, repeated: bool = False
 ) -> History | None:
-    """Motion of a rig after its drive was faster by a tenth for a while; None without a rate of disturbances.
+    """Motion of a rig whose drive is 10 % faster for a short while; None if no eigenvalue sets a time scale.
 
-    With `repeated` the run is made longer until its slip events or oscillations repeat, or its steps are used up.
+    With `repeated` the run is lengthened until its slip events or oscillations repeat, or `MOST_STEPS` is near.
 
     Raises
     ------
@@ -80,10 +80,10 @@ def motion_after(
 
 
 def repeats(run: History) -> bool:
-    """True if of each contact that slips all forward events in the last half of the run are alike.
+    """True if, for each contact that slips, all forward events in the last half of the run are alike to `ALIKE`.
 
-    Two in a row are alike also while an oscillation still grows slowly; over half of the time that it took to become
-    visible it would grow by more than `ALIKE`.
+    Comparing only two successive events would also accept an oscillation that still grows slowly; within the last half
+    of the run it grows by more than `ALIKE`.
     """
     half = 0.5 * float(run["t"][-1])
     names = {one.contact for one in run.slip_events if one.slip > 0}
@@ -92,10 +92,10 @@ def repeats(run: History) -> bool:
 
 
 def swings(run: History, rate: float) -> dict[str, Swings]:
-    """Oscillation of each contact that grows no more in the last half of a run, by name.
+    """Oscillations that have stopped growing in the last half of a run, by contact name.
 
-    Empty in a run with slip events there, and in one so short that small disturbances, which grow at `rate` (1/s),
-    would not have doubled in that time: then nothing tells a cycle from slow growth.
+    Empty if that half has slip events, or is too short for small disturbances, which grow at `rate` (1/s), to double:
+    a cycle could not be distinguished from slow growth.
     """
     end = float(run["t"][-1])
     if any(one.begin > 0.5 * end for one in run.slip_events) or rate * 0.5 * end < math.log(2):
@@ -111,15 +111,15 @@ def _alike(events: list[AnySlip]) -> bool:
 
 
 def grown(run: History) -> str:
-    """What a run without slip events did before it ended: its last swings, if they grew; empty if there are none."""
+    """Clause on the last swings of a run without slip events, if they grew; empty if there are none."""
     found = growing_swings(run.events, float(run["t"][-1]))
     return joined(run.rig, {name: f"{GROWS[True]}, last between {speeds(one)}" for name, one in found.items()})
 
 
 def is_irregular(run: History) -> bool:
-    """True if slips of each contact that slips go on in the last half of the run and vary without a trend.
+    """True if each contact that slips goes on slipping in the last half of the run, by amounts without a trend.
 
-    That is if they become larger and smaller by turns, and no larger in its last quarter than in the one before.
+    No trend means: slips become larger and smaller by turns, and are no larger in the last quarter than in the third.
     """
     end = float(run["t"][-1])
     late = [one for one in run.slip_events if one.slip > 0 and one.begin > 0.5 * end]
@@ -136,9 +136,9 @@ def is_irregular(run: History) -> bool:
 
 
 def judder_sentence(rig: Slider | Machine, eigenvalues: Sequence[complex], branch: int = 0) -> str:
-    """Sentence on what an unstable rig does after a small disturbance; empty where that is not known.
+    """Sentence on the motion of an unstable rig after a small disturbance; empty where that is not known.
 
-    That is its slip events, if they repeat or vary without a trend, an oscillation that goes on, or how it ends.
+    It describes slip events that repeat or vary without a trend, a lasting oscillation, or how the motion ends.
     """
     try:
         if terms_of(rig.mechanism()) > MOST_TERMS:

@@ -1,4 +1,4 @@
-"""What a verdict says of machines alone: forces, pull of the links, modes, reason, warnings."""
+"""Parts of a verdict's text that only machines have: forces, pull of the links, modes, reason, warnings."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from steadyslip.model.steady_results import SteadyMachine
 from steadyslip.verdict.causes import why_delay_is_ill_posed
 from steadyslip.verdict.measured import response_facts
 from steadyslip.verdict.reasons import ON_EDGE, UNDAMPED
-from steadyslip.verdict.words import BEYOND, EDGE_WORDS, STABLE_MEANS, beyond, instead, told
+from steadyslip.verdict.words import BEYOND, EDGE_WORDS, STABLE_MEANS, beyond, format_parameter, instead
 
 if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings
 
 MEANS = STABLE_MEANS.format(what="an oscillation")
-"""What the verdict "stable" leaves open of a machine."""
+"""Limits of the verdict "stable" on a machine, as text."""
 
 
 def sliding_rows(analysis: Findings) -> list[tuple[str, str]]:
@@ -33,7 +33,7 @@ def sliding_rows(analysis: Findings) -> list[tuple[str, str]]:
 
 
 def stability_rows(analysis: Findings) -> list[tuple[str, str]]:
-    """Rows (label, text) on the leading mode, why it grows, and what a measured response leaves open."""
+    """Rows (label, text) on the leading mode, why it grows, and the errors of a measured response."""
     rows = [("the mode", analysis.mode.words())] if analysis.mode else []
     rows += [("why it grows", analysis.origin.words)] if analysis.origin else []
     return rows + (response_facts(analysis.rig, analysis.margins) if has_response(analysis.rig) else [])
@@ -50,7 +50,7 @@ def _pull(machine: Machine, name: str) -> list[tuple[str, str]]:
 
 
 def meaning(analysis: Findings) -> list[str]:
-    """Lines on the limits of a decided verdict "stable", and on what to ask next of an unstable machine."""
+    """Lines on the limits of the verdict "stable", or on the motion of an unstable machine; only if decided."""
     if not analysis.stable:
         return [] if analysis.growth_rate == math.inf or has_response(analysis.rig) else [instead(analysis)]
     return [MEANS]
@@ -66,11 +66,11 @@ PHRASES = {
     "stable": "it is stable",
     **BEYOND,
 }
-"""Phrases of which reasons of machines are made; the keys are used by pages too."""
+"""Phrases for the reasons of machines' verdicts; browser pages use the same keys."""
 
 
 def reason(found: Findings) -> str:
-    """Sentence that explains a machine's verdict: what grows, and the nearest edge of all parameters."""
+    """Sentence that explains a machine's verdict: kind of growth, and the nearest edge among all parameters."""
     if found.growth_rate == math.inf:
         late = "" if by_matrices(found.rig) else why_delay_is_ill_posed(operating_point(found.rig))
         return late or PHRASES["are ill-posed"]
@@ -79,25 +79,25 @@ def reason(found: Findings) -> str:
     if found.on_edge:
         return PHRASES["undamped"] + hint if found.undamped else PHRASES["on edge"]
     if not found.stable:
-        counted = not found.eigenvalues and found.unstable_roots  # pairs, as far as they are not odd
+        counted = not found.eigenvalues and found.unstable_roots  # an even count means oscillating pairs
         swings = counted % 2 == 0 if counted else any(s.imag for s in found.eigenvalues[:1])
         return PHRASES["oscillatory" if swings else "divergence"] + hint
     return PHRASES["dies out"] + hint
 
 
 def nearest_edge(found: Findings, margin: Margin) -> str:
-    """Clause on the nearest edge of a parameter: side, value and what happens beyond it."""
+    """Clause on the nearest edge of a parameter: side, value and what happens beyond; empty without an edge."""
     edge = margin.edge
     if edge is None:
         return ""
     side = "above" if edge.value > margin.value else "below"
-    value = told(found.rig, margin.parameter, edge.value, margin.value)
+    value = format_parameter(found.rig, margin.parameter, edge.value, margin.value)
     what = PHRASES["stable"] if edge.stable == side else EDGE_WORDS["quiet"] if edge.quiet == side else beyond(edge)
     return PHRASES["nearest"].format(name=said(found.rig, margin.parameter), side=side, value=value, beyond=what)
 
 
 def _sliding(steady: SteadyMachine) -> str:
-    """Steady sliding of each contact; those that slide alike in one clause."""
+    """Text on steady sliding of each contact; contacts with equal numbers share a clause."""
     alike: dict[str, list[str]] = {}
     for name, one in steady.contacts.items():
         told_of = (
@@ -112,7 +112,7 @@ def _sliding(steady: SteadyMachine) -> str:
 
 
 def warnings(analysis: Findings, states: Sequence[SteadyMachine]) -> Iterator[str]:
-    """Warnings: friction that is not positive, laws without memory, structures reduced or that give way."""
+    """Warnings on friction that is not positive, laws without memory, reduced and unstable structures."""
     contacts = states[0].contacts
     for name, one in contacts.items():
         if one.friction <= 0:

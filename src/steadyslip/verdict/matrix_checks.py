@@ -1,9 +1,9 @@
-"""Numbers and checks of the verdict on a machine given by matrices.
+"""Numbers and checks of the verdict on a machine analysed by its matrices.
 
-- Steady sliding: the laws themselves, and the matrices, leave forces in balance.
-- Eigenvalues: the matrices are singular at the rightmost ones; turns of the contacts' return difference, with the
-  machine sliding without friction and contact as reference, tell as many that grow (theory 13).
-- Edges: eigenvalues on both sides.
+- Steady sliding: forces by the laws' own methods and by the matrices balance.
+- Eigenvalues: the matrices are singular at the rightmost ones; turns of the contacts' return difference about 0, with
+  the machine without contact forces as reference, give the same number of growing ones (theory 13).
+- Edges: eigenvalues on both sides agree with the edge.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from steadyslip.model.numeric.pencil import linearised
 from steadyslip.verdict.checks import BALANCE_TOLERANCE, SIDE_OFFSETS, missing_edges
 from steadyslip.verdict.numbers import rates_of
 
-_CHECKED = 8  # rightmost eigenvalues whose matrix is looked at: a decomposition each
+_CHECKED = 8  # rightmost eigenvalues checked: each takes a matrix decomposition
 
 
 def matrix_numbers(point: MachinePoint) -> dict[str, Any]:
-    """Fields of a verdict from the eigenvalues."""
+    """Fields of `Analysis` by name that follow from the eigenvalues."""
     pencil = point.pencil
     if not pencil.posed:
         return {"stable": False} | rates_of((), math.inf)
@@ -42,14 +42,14 @@ def matrix_numbers(point: MachinePoint) -> dict[str, Any]:
 
 
 def is_on_edge(point: MachinePoint) -> bool:
-    """True if an eigenvalue neither grows nor decays to 9 digits, and no other grows."""
+    """True if the real part of an eigenvalue is 0 to within `ON_THE_EDGE` of its modulus, and no other grows."""
     found = point.pencil.eigenvalues
     near = np.abs(found.real) <= ON_THE_EDGE * np.abs(found)
     return bool(np.any(near) and not np.any(found.real[~near] > 0))
 
 
 def matrix_checks(point: MachinePoint, stable: bool, on_edge: bool) -> tuple[Check, ...]:
-    """Checks of steady sliding, eigenvalues and how many grow."""
+    """Checks of steady sliding, eigenvalues and, where it can be counted, the number of growing ones."""
     steady = check(
         "steady sliding", "forces by the laws and the matrices added up", _imbalance(point), BALANCE_TOLERANCE
     )
@@ -67,7 +67,9 @@ def matrix_checks(point: MachinePoint, stable: bool, on_edge: bool) -> tuple[Che
 
 
 def _growing_by_turns(point: MachinePoint) -> int | None:
-    """Number of growing roots from those of the machine without contact forces; None if these lie on the axis."""
+    """Number of growing roots: those of the machine without contact forces plus the turns of the contacts' return
+    difference; None if a root without contact forces lies on the imaginary axis, or the turns cannot be counted.
+    """
     sites = tuple(replace(site, area=0.0) for site in point.matrices.sites)
     free = linearised(replace(point.matrices, sites=sites), point.balance)
     roots = free.eigenvalues
@@ -79,7 +81,9 @@ def _growing_by_turns(point: MachinePoint) -> int | None:
 
 
 def _imbalance(point: MachinePoint) -> float:
-    """Largest sum of forces on a coordinate, relative to the largest force on any, with the laws' own methods."""
+    """Largest relative residual of steady sliding, by the laws' own methods: net force on a coordinate over the largest
+    force on any, or friction stress.
+    """
     matrices, found = point.matrices, point.balance
     terms = [matrices.force, -matrices.damping @ matrices.speeds, -matrices.stiffness @ found.displacement]
     terms += [-matrices.integral_acts * found.integral]
@@ -98,9 +102,9 @@ def _imbalance(point: MachinePoint) -> float:
 def matrix_edge_checks(
     point: MachinePoint, margins: Sequence[Margin], missing: Sequence[str]
 ) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
-    """Margins without edges that fail their check, and a check for each: eigenvalues on both sides.
+    """Margins without the edges that fail their check, and the checks: eigenvalues on both sides of each edge.
 
-    One check more, which fails, names the parameters that are `missing` among the margins.
+    A failed check is added that names the parameters in `missing`, whose edges were not searched for.
     """
     lost, checks = [], list(missing_edges(missing, "eigenvalues of the whole structure at every value take minutes"))
     for margin in margins:
@@ -115,7 +119,7 @@ def matrix_edge_checks(
 
 
 def _sides_agree(point: MachinePoint, margin: Margin, edge: Boundary, share: float) -> bool:
-    """True if stability below and above an edge is what it says, at `share` of its value from it."""
+    """True if stability at `share` times the edge's value below and above it agrees with the edge."""
     size = abs(edge.value) or abs(margin.value) or margin.searched[1]
     domain = point.machine.parameters()[edge.parameter].role.domain
     beside = []

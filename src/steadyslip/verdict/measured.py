@@ -1,4 +1,4 @@
-"""Numbers and lines of the verdict on a machine whose structure is a measured response."""
+"""Numbers and text rows of the verdict on a machine whose structure is a measured frequency response."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
 from steadyslip.verdict.numbers import rates_of
 
-_TOLD = 1e-4  # relative width of an edge's bracket above which it is told
-_EDGES = 3  # nearest edges that are asked of the modes as well
-_SURE = 4.0  # standard errors within which two routes agree
+_TOLD = 1e-4  # relative width of an edge's bracket (or of a growth rate) above which it is reported
+_EDGES = 3  # nearest edges that are computed from the identified modes as well
+_SURE = 4.0  # standard errors within which two computations agree
 _UNLIKE = (
     " (more than errors away from the turns: modes near the ends of the band are not told apart from those beyond)"
 )
@@ -26,7 +26,7 @@ _COUNTED = {0: "no root grows", 1: "a root grows without oscillating", 2: "a pai
 
 
 def response_numbers(found: MeasuredMachine) -> dict[str, Any]:
-    """Fields of a verdict whose growing roots were counted; the root itself where one pair grows."""
+    """Fields of `Analysis` by name from a count of growing roots; with the eigenvalue where one pair grows."""
     growing = found.count.growing
     root = found.root()[0] if growing == 2 else None
     if not found.contacts.posed:
@@ -38,7 +38,7 @@ def response_numbers(found: MeasuredMachine) -> dict[str, Any]:
 
 
 def response_facts(machine: Machine, margins: Sequence[Margin]) -> list[tuple[str, str]]:
-    """Rows (label, text) on what a verdict from a measured response rests on, and on its errors."""
+    """Rows (label, text) on the measured response behind a verdict, its modes and its errors; none if undecided."""
     found = measured_machine(machine)
     if found.count.growing is None:
         return []
@@ -67,7 +67,9 @@ def response_facts(machine: Machine, margins: Sequence[Margin]) -> list[tuple[st
 
 
 def _by_modes(machine: Machine, margins: Sequence[Margin]) -> str:
-    """What the modes identified from the response say, and whether it is what the turns of the determinant say."""
+    """Text on growing roots and edges by the modes identified from the response, and whether they agree with those by
+    the turns of the determinant.
+    """
     try:
         found = modal_machine(machine)
     except NotAvailable as why:

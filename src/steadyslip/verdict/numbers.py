@@ -18,12 +18,12 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasipolynomial, require_range
 from steadyslip.verdict.checks import relative_errors
 
-_BESIDE_AXIS = 1e-12  # share of a real part that is rounding: the least of a pair that leaves the axis is some 1e-8
-_TERMS = 4_000_000  # evaluated on the imaginary axis for the roots of a rig with delays: two to four seconds
+_BESIDE_AXIS = 1e-12  # |real part| over modulus that counts as rounding: a pair that leaves the axis has 1e-8 at least
+_TERMS = 4_000_000  # most terms evaluated on the imaginary axis for a rig with delays: two to four seconds
 
 
 def _without_delay(values: OperatingPoint) -> dict[str, Any]:
-    """Fields of a rig whose characteristic equation is a polynomial."""
+    """Fields of `Analysis` by name for a rig whose characteristic equation is a polynomial."""
     c = characteristic(values)
     stable = bool(is_stable(values))
     while len(c) > 2 and c[-1] == 0:
@@ -37,7 +37,9 @@ def _without_delay(values: OperatingPoint) -> dict[str, Any]:
 
 
 def _with_delays(values: OperatingPoint) -> dict[str, Any]:
-    """Fields of a rig with delays, whose characteristic equation is a sum of polynomials times exp(−s delay)."""
+    """Fields of `Analysis` by name for a rig with delays: its characteristic equation is a sum of polynomials times
+    exp(−s delay).
+    """
     c, h = quasipolynomial(values)
     count = int(unstable_roots(values))
     return {
@@ -51,12 +53,12 @@ def _with_delays(values: OperatingPoint) -> dict[str, Any]:
 
 
 def linear_numbers(values: OperatingPoint) -> dict[str, Any]:
-    """Fields of a verdict by name, from the characteristic equation; eigenvalues that fail their check are left out.
+    """Fields of `Analysis` by name, from the characteristic equation; without eigenvalues that fail their check.
 
     Raises
     ------
     NotAvailable
-        If growing roots under delays cannot be counted, so that there is no verdict.
+        If the growing roots of a rig with delays cannot be counted, so that there is no verdict.
     """
     require_range(values)
     if values.model.delays:
@@ -81,21 +83,19 @@ def _numbers(values: OperatingPoint) -> dict[str, Any]:
         numbers["eigenvalues"] = _on_the_axis(numbers["eigenvalues"])
         rate = max((s.real for s in numbers["eigenvalues"]), default=rate)
     eigenvalues = numbers["eigenvalues"]
-    if eigenvalues and eigenvalues[-1].imag > 0:  # a list of some of infinitely many ends between two of a pair
+    if eigenvalues and eigenvalues[-1].imag > 0:  # the list was cut between two of a pair
         eigenvalues = numbers["eigenvalues"] = (*eigenvalues, eigenvalues[-1].conjugate())
     return numbers | rates_of(eigenvalues, rate)
 
 
 def _on_the_axis(eigenvalues: tuple[complex, ...]) -> tuple[complex, ...]:
-    """Eigenvalues of a machine that nothing damps, without rounding beside the imaginary axis, the slowest first."""
+    """Eigenvalues of an undamped machine with real parts that are rounding set to 0; the slowest first."""
     found = (s if abs(s.real) > _BESIDE_AXIS * abs(s) else complex(0.0, s.imag) for s in eigenvalues)
     return tuple(sorted(found, key=lambda s: (-s.real, abs(s.imag), -s.imag)))
 
 
 def rates_of(eigenvalues: tuple[complex, ...], rate: float | None) -> dict[str, Any]:
-    """Growth rate, times to halve or double, period and damping ratio of eigenvalues (1/s) with the largest real part
-    `rate`.
-    """
+    """Fields of `Analysis` on growth rate, time to halve or double, period and damping ratio; `rate` in 1/s."""
     numbers: dict[str, Any] = {"growth_rate": rate}
     if rate is not None and math.isfinite(rate) and rate != 0:
         numbers["time_to_halve" if rate < 0 else "time_to_double"] = math.log(2) / abs(rate)

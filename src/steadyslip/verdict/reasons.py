@@ -1,4 +1,4 @@
-"""The reason of a verdict on a slider, in one sentence; browser pages fill the phrases of `REASONS` themselves."""
+"""Reason of a verdict on a slider, in one sentence; browser pages fill the phrases of `REASONS` themselves."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from steadyslip.machine.slider import Slider
     from steadyslip.verdict.findings import Findings
 
-# Relative distance below which an edge counts as the one that the rig is on. Rounding of the growth rate moves an edge
-# further in a parameter of weak effect, so this is wider than rounding; chosen by trial, wider would merge two edges.
+# Relative distance within which a rig on an edge counts as on this edge. Wider than rounding, since rounding of the
+# growth rate moves edges in parameters of weak effect; chosen by trial: much wider, two edges could not be told apart.
 NEXT_TO_IT = 1e-6
 
 ON_EDGE = "neither verdict should be relied on: the least change of a number decides; give it a damping if it has none"
@@ -44,11 +44,11 @@ REASONS = {
     "one edge": ", {side} which sliding is stable",
     "several": ", the nearest edge of the stable set",
 }
-"""Phrases of which reasons of sliders are made; the keys are used by pages too (`page_reasons`)."""
+"""Phrases for the reasons of sliders' verdicts; browser pages use the same keys (`page_reasons`)."""
 
 
 def reason(analysis: Findings) -> str:
-    """Sentence that explains a slider's verdict, with its stiffness over the critical one where there is one."""
+    """Sentence that explains a slider's verdict, with the ratio of stiffness to critical stiffness if that exists."""
     if analysis.growth_rate == math.inf:
         return why_ill_posed(analysis)
     support = support_stiffness(analysis)
@@ -56,7 +56,7 @@ def reason(analysis: Findings) -> str:
     if analysis.on_edge and own == 0 and 0 in analysis.eigenvalues:
         return REASONS["free"]
     ratio = math.nan if support.critical is None else own / (support.critical + support.beside)
-    if analysis.on_edge and not abs(ratio - 1) <= NEXT_TO_IT:  # on another edge than that of the stiffness
+    if analysis.on_edge and not abs(ratio - 1) <= NEXT_TO_IT:  # on the edge of another parameter
         return ON_EDGE
     if support.critical is None:
         if not support.stable and analysis.stable:

@@ -1,4 +1,4 @@
-"""Differences between two rigs, and the part of each in the change of their verdict."""
+"""`Difference`s between two rigs, and the part that each has in the change of their verdict."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from steadyslip.machine.slider import Slider
 from steadyslip.machine.surfaces import Surface
 from steadyslip.verdict.between import Between, Place, ones_and_others, places, shapley
 from steadyslip.verdict.unknown_in_pairs import Pairs
-from steadyslip.verdict.words import told, told_range
+from steadyslip.verdict.words import format_parameter, format_parameter_range
 
 PARTLY = "not at every value"
-"""Verdict that depends on the values of what is not known."""
+"""Word for a verdict that depends on the values of unknown parameters."""
 
 
 @dataclass(frozen=True)
 class Difference(Displayed):
-    """A difference between two rigs, and its part in the change of the verdict.
+    """One difference between two rigs, and the part that it has in the change of the verdict.
 
     Attributes
     ----------
     parameter : str
-        Dotted name; of keys that exclude each other joined by ``+``.
+        Dotted name; keys that exclude each other are joined by ``+``.
     first, second : str
-        What each rig has.
+        Value of each rig, as text.
     part : float
-        Its Shapley value: of ``measure = "safety"`` the factor by which it changes k/k_cr, of ``"growth"`` its change
-        of the growth rate, 1/s; NaN where that is not known. Of rigs with unknown values the mean over those tried.
+        Shapley value: the factor on k/k_cr with ``measure = "safety"``, the change of the growth rate (1/s) with
+        ``"growth"``; NaN where that is not known. For rigs with unknown parameters the mean over the values tried.
     share : float
-        Size of its Shapley value over the sizes of all (of the logarithm of k/k_cr, or of the growth rate).
+        Absolute Shapley value (of the logarithm of k/k_cr, or of the growth rate) over the sum for all differences.
     first_with, second_with : str
         Verdict on the first rig with the second's value, and on the second rig with the first's: ``stable``,
-        ``unstable``, ``no steady sliding``, ``not possible``, or ``not at every value`` of what is not known.
+        ``unstable``, ``no steady sliding``, ``not possible``, or ``not at every value`` of unknown parameters.
     parts : tuple of float
-        Least and largest part over the values of what is not known; both are `part` where all is known.
+        Least and largest part over the values of unknown parameters; both are `part` without unknown parameters.
     """
 
     parameter: str
@@ -56,7 +56,7 @@ class Difference(Displayed):
     parts: tuple[float, float]
 
     def told(self, measure: str) -> str:
-        """Part of the difference as text, with its share of all."""
+        """Part of the difference as text, with its share of the sum of all parts; empty without a measure."""
         if not measure:
             return ""
         low, high = (f"{one:.3g}" if measure == "safety" else f"{one:+.3g}" for one in self.parts)
@@ -66,7 +66,7 @@ class Difference(Displayed):
 
 
 def differences_of(pairs: Pairs) -> tuple[str, tuple[Difference, ...]]:
-    """Measure and differences of two comparable rigs, the one with the largest part first."""
+    """Measure (see `shapley`) and differences of two comparable rigs, the largest part first."""
     betweens = [Between(a, b, places(a, b)) for a, b in pairs.tried]
     betweens = [one for one in betweens if one.places]
     if not betweens:
@@ -94,7 +94,7 @@ def differences_of(pairs: Pairs) -> tuple[str, tuple[Difference, ...]]:
 def _sorted(
     pairs: Pairs, between: Between, named: Mapping[str, Place], values: Array, alone: Sequence[Any], measure: str
 ) -> tuple[Difference, ...]:
-    """Differences from their Shapley values (pairs, differences) and the verdicts with each alone."""
+    """Differences, largest part first, from Shapley values (pairs, differences) and the verdicts with each alone."""
     mean = values.mean(axis=0)
     size = float(np.sum(np.abs(mean)))
     found = []
@@ -111,7 +111,7 @@ def _sorted(
 
 
 def one_word(words: Sequence[str]) -> str:
-    """The verdict that all have, or that they differ."""
+    """The common verdict if all `words` are equal, else `PARTLY`."""
     return words[0] if len(set(words)) == 1 else PARTLY
 
 
@@ -122,7 +122,7 @@ def _name(place: Place) -> str:
 
 
 def _texts(pairs: Pairs, between: Between, place: Place) -> tuple[str, str]:
-    """What each rig has at a place."""
+    """Values of the first and of the second rig at a place, as text."""
     rigs, named = ((between.first, pairs.of_first), (between.second, pairs.of_second)), len(place) > 1
     first, second = (
         [_within(rig, one.name, of[one.name]) if one.name in of else _text(rig, one.name, value, named)
@@ -133,12 +133,12 @@ def _texts(pairs: Pairs, between: Between, place: Place) -> tuple[str, str]:
 
 
 def _within(rig: Slider | Machine, name: str, ends: tuple[float, float]) -> str:
-    """Interval of what is not known."""
-    return f"somewhere in {told_range(rig, name, *ends)}"
+    """Interval of an unknown parameter, as text."""
+    return f"somewhere in {format_parameter_range(rig, name, *ends)}"
 
 
 def _text(rig: Slider | Machine, name: str, value: Any, named: bool) -> str:
-    """A value with its unit, and its key where `named`; what stands for None, if anything does."""
+    """Format a value with its unit, and with its key if `named`; None becomes the parameter's default, or empty."""
     known = rig.parameters().get(name)
     if value is None:
         return "" if named or known is None else known.role.unless_given
@@ -154,12 +154,12 @@ def _text(rig: Slider | Machine, name: str, value: Any, named: bool) -> str:
         return "; ".join(_item_text(rig, f"{name}.{i}") for i in range(1, len(value) + 1))
     if known is None or not isinstance(value, float):
         return str(value)
-    words = told(rig, name, value)
+    words = format_parameter(rig, name, value)
     return f"{name.rpartition('.')[2]} {words}" if named else words
 
 
 def _item_text(rig: Slider | Machine, name: str) -> str:
-    """Parameters of an item of a list, such as ``b 0.006, d_c 4 um``."""
+    """Format the parameters of a list item, such as ``b 0.006, d_c 4 um``."""
     own = {key.removeprefix(f"{name}."): address.value for key, address in rig.parameters().items()
            if key.startswith(f"{name}.") and address.value is not None}  # fmt: skip
-    return ", ".join(f"{key} {told(rig, f'{name}.{key}', value)}" for key, value in own.items())
+    return ", ".join(f"{key} {format_parameter(rig, f'{name}.{key}', value)}" for key, value in own.items())

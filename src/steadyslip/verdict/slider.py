@@ -1,4 +1,4 @@
-"""What a verdict says of sliders alone: stresses, pull of the spring, stable stiffnesses, warnings."""
+"""Parts of a verdict that only sliders have: stresses, pull of the spring, stable stiffnesses, warnings."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ if TYPE_CHECKING:
 UNLIMITED = (
     "Neither mass nor damping limits what grows: another disturbance may end in stick-slip or a run-away (blow-up)."
 )
-"""Line behind the simulated motion of an unstable rig whose velocity nothing limits."""
+"""Line added after the simulated motion of an unstable rig whose velocity nothing limits."""
 MEANS = STABLE_MEANS.format(what="an oscillation or a run-away")
-"""What the verdict "stable" leaves open of a slider."""
+"""Limits of the verdict "stable" on a slider, as text."""
 AT_EDGE = {"at the edge": "oscillation with period {period}", "along the axis": "critical stiffness {critical}"}
-"""Rows on the critical stiffness, label and text; pages say them too."""
+"""Text of rows on the critical stiffness, by label; browser pages use the same."""
 MOST_WINDOWS = 4  # stable intervals of stiffness listed in the text; chosen by trial, length against completeness
 
 
 def numbers_of(rig: Slider, point: OperatingPoint) -> dict[str, Any]:
-    """Fields of a verdict that follow from the characteristic equation and from the stable set in stiffness."""
+    """Fields of `Analysis` by name from the characteristic equation and from the stable set in stiffness."""
     return linear_numbers(point) | stiffness_numbers(rig, point)
 
 
 def stiffness_numbers(rig: Slider, point: OperatingPoint) -> dict[str, Any]:
-    """Fields of a verdict on stiffness: stable intervals (Pa/m) and the edge nearest to the rig's own stiffness."""
+    """Fields of `Analysis` by name on stiffness: stable intervals (Pa/m) and the edge nearest to the rig's own."""
     try:
         found = set_of_one(point)
-    except NotAvailable:  # a delay makes windows without end
+    except NotAvailable:  # with a delay there may be infinitely many stable windows
         return {}
     own = float(point.named()["slider.stiffness"])
     intervals = found.intervals[np.all(np.isfinite(found.intervals[:, :1]), axis=-1)]
@@ -64,7 +64,7 @@ def stiffness_numbers(rig: Slider, point: OperatingPoint) -> dict[str, Any]:
 
 
 def checked_stiffness_numbers(rig: Slider, point: OperatingPoint) -> tuple[dict[str, Any], tuple[Check, ...]]:
-    """`stiffness_numbers`, and the check of the critical stiffness; what fails it is left out."""
+    """`stiffness_numbers` and the check of the critical stiffness, which is left out if it fails."""
     numbers = stiffness_numbers(rig, point)
     if numbers.get("critical_angular_frequency") is None:
         return numbers, ()
@@ -75,7 +75,7 @@ def checked_stiffness_numbers(rig: Slider, point: OperatingPoint) -> tuple[dict[
 
 
 def sliding_rows(analysis: Findings) -> list[tuple[str, str]]:
-    """Rows (label, text) on steady sliding, and on what T, the force that presses the contact, contains."""
+    """Rows (label, text) on steady sliding, and on the parts of the pull T if it sets the normal force."""
     normal, shear = (stress_name(f"{one} stress", analysis.rig.area) for one in ("normal", "shear"))
     steady = analysis.steady
     text = (
@@ -96,7 +96,7 @@ def stability_rows(analysis: Findings) -> list[tuple[str, str]]:
 
 
 def _stress(analysis: Findings, value: float) -> str:
-    """Stress as it is told; of a rig with an area as force and stress, in the order in which its file has them."""
+    """Format a stress; with a contact area as force and stress, the kind that the rig's file uses first."""
     area = analysis.rig.area
     stress = format_quantity(value, "Pa")
     if area is None:
@@ -106,7 +106,7 @@ def _stress(analysis: Findings, value: float) -> str:
 
 
 def _pull(rig: Slider) -> list[tuple[str, str]]:
-    """Row (label, text) naming what the pull T includes; empty if T is the force of the spring alone."""
+    """Row (label, text) naming what the pull T includes; none if T is the spring's force or sets no normal force."""
     control = [rig.drive.proportional(), rig.drive.dashpot(), rig.drive.integral()]
     inside = {"spring": rig.stiffness or rig.axial_stiffness, "damper": rig.damping, "controller": any(control)}
     pulling = [f"the {name}" for name, there in inside.items() if there]
@@ -161,7 +161,7 @@ def _limited(rig: Slider) -> bool:
 
 
 def warnings(analysis: Findings, states: Sequence[SteadySliding]) -> Iterator[str]:
-    """Warnings: several steady states, speed, no memory in the friction law, friction that is not positive."""
+    """Warnings on several steady states, a friction law without memory, and friction that is not positive."""
     rig, steady = analysis.rig, states[analysis.branch]
     if len(states) > 1:
         stresses = [format_quantity(one.normal_stress, "Pa", area=rig.area) for one in states]

@@ -1,4 +1,4 @@
-"""Distributions of parameters within tolerances, and rigs drawn from them."""
+"""Probability distributions of parameters within tolerances, and samples of rigs drawn from them."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
 GROUPS = 16
-"""Independent sequences of points, whose shares tell the error of their mean: 16 give it to a fifth."""
-MOST_ALL_CORNERS = 12  # parameters of which every corner is tried, 4096; of more as many drawn at random
-_EDGE = 1e-15  # least probability: keeps quantiles of the normal distribution finite
+"""Independent groups of sampled rigs, whose scatter gives the error of a share: 16 groups give it to a fifth."""
+MOST_ALL_CORNERS = 12  # up to this many parameters every corner is tried (4096); beyond, 4096 random ones
+_EDGE = 1e-15  # smallest probability used: keeps normal quantiles finite
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Distribution of one parameter: even between two ends, or normal with a standard deviation to each side.
+    """Distribution of one parameter: uniform between two ends, or normal with its own standard deviation on each side.
 
     Attributes
     ----------
     value, low, high : float
-        The rig's own, and the ends or the values one standard deviation away; SI units.
+        Nominal value, and the ends (uniform) or the values one standard deviation away (normal); SI units.
     normal : bool
     least, most : float
-        Bounds of the parameter's domain, beyond which a normal distribution is cut off.
+        Bounds of the parameter's domain, at which a normal distribution is truncated.
     relative : bool
         True if the deviations are shares of the value.
     """
@@ -52,7 +52,7 @@ class Spread:
     relative: bool
 
     def moved(self, value: Any) -> Spread:
-        """The same tolerance about another value, or about each of an array."""
+        """Distribution with the same tolerance about another value, or about each of an array."""
         if self.relative and self.value:
             low, high = (value + (end - self.value) * np.abs(value / self.value) for end in (self.low, self.high))
         else:
@@ -61,7 +61,7 @@ class Spread:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Ends of the range; of a normal distribution those between which 95 % lie."""
+        """Ends of the range; for a normal distribution the 2.5 % and 97.5 % quantiles."""
         return (
             (float(self.quantile(np.array(0.025))), float(self.quantile(np.array(0.975))))
             if self.normal
@@ -69,7 +69,7 @@ class Spread:
         )
 
     def quantile(self, share: Array) -> Array:
-        """Values below which the given shares of all values lie."""
+        """Quantiles of the distribution at probabilities `share`, any shape."""
         if not self.normal:
             return np.asarray(self.low + (self.high - self.low) * share)
         from scipy.special import ndtr, ndtri
@@ -90,9 +90,9 @@ class Spreads:
     ----------
     rig : Slider or Machine
     of : dict of str to Spread
-        By dotted name.
+        Distributions by dotted name.
     mixing : ndarray (d, d)
-        Triangular matrix that turns independent normal numbers into correlated ones.
+        Lower triangular matrix that turns independent normal numbers into correlated ones.
     """
 
     rig: Slider | Machine
@@ -100,11 +100,11 @@ class Spreads:
     mixing: Array
 
     def drawn(self, log2: int) -> dict[str, Array]:
-        """Values of every parameter, (GROUPS, 2**log2)."""
+        """Sampled values of every parameter by name, each (GROUPS, 2**log2)."""
         return {name: self.of[name].quantile(shares) for name, shares in self.shares(log2).items()}
 
     def shares(self, log2: int) -> dict[str, Array]:
-        """Share of all values below that of a rig, by parameter, (GROUPS, 2**log2); by scrambled Sobol points."""
+        """Arguments of `Spread.quantile` by parameter, each (GROUPS, 2**log2), from scrambled Sobol points."""
         from scipy.special import ndtr, ndtri
         from scipy.stats import qmc
 
@@ -118,7 +118,7 @@ class Spreads:
         return {name: even[..., i] for i, name in enumerate(self.of)}
 
     def corners(self) -> dict[str, Array]:
-        """Values of every parameter at the corners of the ranges; normally distributed ones keep their value."""
+        """Values by parameter at the corners of the ranges, each (corners,); normally distributed ones are nominal."""
         shares = self.corner_shares()
         return {
             name: np.full(len(shares[name]), one.value) if one.normal else one.quantile(shares[name])
@@ -126,7 +126,7 @@ class Spreads:
         }
 
     def corner_shares(self) -> dict[str, Array]:
-        """Share of all values below that at the corners, 0 or 1; a half of normally distributed ones."""
+        """Arguments of `Spread.quantile` by parameter at the corners, each (corners,): 0 or 1; 0.5 if normal."""
         bounded = [name for name, one in self.of.items() if not one.normal]
         if len(bounded) <= MOST_ALL_CORNERS:
             high = np.array(list(itertools.product((0.0, 1.0), repeat=len(bounded))))
@@ -136,9 +136,9 @@ class Spreads:
         return {name: high[:, bounded.index(name)] if name in bounded else np.full(len(high), 0.5) for name in self.of}
 
     def shapes(self) -> dict[str, tuple[float, ...]]:
-        """Ends over the value and whether they are of a normal distribution, by parameter; correlations, by pair.
+        """By parameter: both ends over the value, and 1 if normal, else 0; by pair of parameters: the correlation.
 
-        They are the same for totals of a contact and for stresses; of a value that is zero the ends are as they are.
+        They are equal for totals of a contact and for stresses; where the value is 0 the ends are not divided.
         """
         found: dict[str, tuple[float, ...]] = {
             name: (one.low / (one.value or 1.0), one.high / (one.value or 1.0), float(one.normal))
@@ -151,7 +151,7 @@ class Spreads:
         return found
 
     def possible(self, varied: Mapping[str, Array]) -> Any:
-        """Mask of the rigs whose numbers do not contradict each other (bool or array of bool)."""
+        """Mask of the rigs whose values are valid together (bool or array of bool)."""
         return valid_together(self.rig, "", varied)
 
 
@@ -198,10 +198,10 @@ def _spread(rig: Slider | Machine, name: str, one: Address, tolerance: Any) -> S
 
 
 def _mixing(of: Mapping[str, Spread], pairs: Sequence[tuple[str, str, float]]) -> Array:
-    """Triangular root of the correlations of the normal numbers behind the parameters.
+    """Cholesky factor of the correlations of the normal numbers from which the parameters are drawn.
 
-    Their correlation is larger than that of evenly spread parameters: ρ = (6/π) asin(r/2) for two of these,
-    ρ = r √(3/π) for one and a normal one.
+    For a correlation ρ of the parameters, that of the normal numbers is 2 sin(π ρ/6) if both parameters are uniform,
+    ρ √(π/3) if one is, and ρ if none is.
     """
     names, matrix, problems = list(of), np.eye(len(of)), []
     for first, second, share in pairs:

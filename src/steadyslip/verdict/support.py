@@ -1,4 +1,4 @@
-"""Stiffness that supports the block (spring, position controller, or both) and the values of it that are stable."""
+"""Stiffness that supports the block of a slider (spring, position controller, or both), and its stable values."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class SupportStiffness(NamedTuple):
     name : str
         ``stiffness`` or, where no spring is beside the controller, the gain, such as ``drive proportional gain``.
     own : float
-        The rig's value of it.
+        The rig's own value.
     beside : float
         Gain of a controller that acts in parallel with the spring; 0 without one.
     critical : float or None

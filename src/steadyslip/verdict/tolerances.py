@@ -1,4 +1,4 @@
-"""`tolerate`: verdicts on rigs sampled within the tolerances of their parameters."""
+"""`tolerate`: verdicts on rigs sampled within the tolerances of a rig's parameters."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from steadyslip.model.build import model_of
 from steadyslip.model.point import operating_point
 from steadyslip.verdict.export import finite
 from steadyslip.verdict.spreads import GROUPS, Spreads, spreads_of
-from steadyslip.verdict.words import told, told_range
+from steadyslip.verdict.words import format_parameter, format_parameter_range
 
-# Numbers of rigs, chosen by trial: computing time against the error of shares and the resolution of ranges (1/64).
-LOG2_CLOSED, LOG2_OTHERS, LOG2_LATE = 12, 8, 4  # rigs of one group: with a closed form, others, those with a delay
+# Sizes of samples, chosen by trial: computing time against the error of shares and the resolution of ranges (1/64).
+LOG2_CLOSED, LOG2_OTHERS, LOG2_LATE = 12, 8, 4  # log2 of rigs per group: with closed form, others, with a delay
 VALUES_ALONE = 65  # values of a parameter that is varied alone, both ends included
-VALUES_SOUGHT = 17  # of each parameter in turn, in the search for a rig judged otherwise
-REACHES = (1.0, 0.1, 0.01, 0.001)  # shares of the range looked at in rounds of that search
-BINS = 32  # of equally many rigs each, between which the verdict's variance is counted as a parameter's own
+VALUES_SOUGHT = 17  # values tried of each parameter in turn in `_otherwise`
+REACHES = (1.0, 0.1, 0.01, 0.001)  # fractions of the range searched in successive rounds of `_otherwise`
+BINS = 32  # bins of equally many rigs: variance between them is attributed to the parameter
 LEAST = 0.01  # share of the variance below which a parameter is not worth naming
-ALIKE = 1e-12  # difference of deviations, as shares of the value, that roundings of a conversion of units explain
+ALIKE = 1e-12  # difference of relative deviations that counts as rounding of a conversion of units
 STUDENT = 2.131  # quantile for 95 % of Student's distribution with GROUPS - 1 degrees of freedom
 GIVEN = Tested(
     "names and their tolerances, or what read_tolerances gives", lambda v: isinstance(v, (Mapping, Tolerances))
@@ -49,16 +49,16 @@ class Alone(Displayed):
     ----------
     parameter : str
     low, high : float
-        Its range, SI units; of a normal distribution that in which 95 % lie.
+        Range of the parameter, SI units; for a normal distribution that of 95 %.
     safety : tuple of float
-        Least and largest safety factor: value over edge of the parameter `Tolerated.along`; NaN without edge.
+        Least and largest safety factor: value of the parameter `Tolerated.along` over its edge; NaN without an edge.
     growth : tuple of float
         Least and largest growth rate of small disturbances, 1/s.
     stable : bool or None
-        Whether sliding is stable throughout the range; None if in a part of it only.
+        True if sliding is stable throughout the range, False if nowhere, None if in a part of it.
     share : float
-        Share of the variance of the verdict, all parameters varied, that goes when this one is known; where all rigs
-        are judged alike, of the variance of the growth rate.
+        Share of the variance of the verdict, all parameters varied, that vanishes once this parameter is known; if all
+        sampled rigs have one verdict, of the variance of the growth rate.
     """
 
     parameter: str
@@ -80,9 +80,9 @@ class Tolerated(ReadOnly):
     ----------
     rig : Slider or Machine
     tolerances : mapping or Tolerances
-        As they were given.
+        The argument of `tolerate`.
     alone : tuple of Alone
-        Each parameter by itself, the one first whose measurement would tell most.
+        Each parameter varied by itself, the largest `Alone.share` first.
     stable : ndarray of bool (m,)
         True for rigs drawn from the distributions of all parameters that slide steadily and stably.
     exists : ndarray of bool (m,)
@@ -90,22 +90,21 @@ class Tolerated(ReadOnly):
     growth : ndarray (m,)
         Growth rate of small disturbances, 1/s: of the leading eigenvalue.
     along : str
-        The parameter of `edge` and `safety`: ``slider.stiffness`` for a slider unless another is named; empty for a
-        machine unless one is named.
+        Parameter to which `edge` and `safety` refer: by default ``slider.stiffness`` for a slider, empty for a machine.
     edge : ndarray (m,)
         Nearest edge of stability in the parameter `along`, SI units; NaN where there is none.
     safety : ndarray (m,)
         Value of the parameter `along` over its nearest edge.
     ranges : dict of str to (float, float)
         Least and largest ``edge``, ``safety`` and ``growth`` of the drawn rigs, of those at the corners and of
-        `otherwise`; without those that none of them has.
+        `otherwise`; without quantities that none of these rigs has.
     error : float
         Half-width of the 95 % interval of `share`.
     corners : int
-        Number of corners of the ranges that were tried, none where every parameter is distributed normally.
+        Number of corners of the ranges that were tried; 0 if every parameter is distributed normally.
     otherwise : dict of str to float
-        Where all rigs are judged alike, a rig within the ranges that is not, by dotted name in SI units: a corner, or
-        found by a search from the rig that is nearest to it; empty if there is none.
+        If all drawn rigs have one verdict, values of a rig within the ranges that has the other, by dotted name in SI
+        units: a corner, or found by a search from the drawn rig nearest to the edge; empty if none was found.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -150,20 +149,20 @@ class Tolerated(ReadOnly):
             else:
                 beside = f", growth rate {format_growth(*one.growth)}" if not self.along else ""
             word = {True: "stable", False: "unstable", None: "stable in a part of it"}[one.stable]
-            ends = told_range(self.rig, one.parameter, one.low, one.high)
+            ends = format_parameter_range(self.rig, one.parameter, one.low, one.high)
             lines.append(f"{one.parameter:<{wide}}{ends} alone: {word}{beside}")
         if len(self.alone) > 1:
             lines.append(f"{'measure next':<{wide}}{self._next()}")
         return "\n".join(lines)
 
     def headline(self) -> str:
-        """Sentence with the share of stable rigs, or about all of them and the corners."""
+        """Sentence on the share of stable rigs; if that is all or none, on corners of the ranges and exceptions too."""
         count, share = len(self.stable), self.share
         if 0 < share < 1:
             return f"Stable in {format_chance(share, self.error)} of {count} rigs within the tolerances"
         words = f"Stable in {'all' if share else 'none of'} {count} rigs within the tolerances"
         if self.otherwise:
-            values = (f"{name} {told(self.rig, name, value)}" for name, value in self.otherwise.items())
+            values = (f"{name} {format_parameter(self.rig, name, value)}" for name, value in self.otherwise.items())
             kind = "but not in every one: unstable" if share else "but in another one: stable"
             return f"{words}, {kind} at {', '.join(values)}"
         if not self.corners:
@@ -176,7 +175,7 @@ class Tolerated(ReadOnly):
         return f"{', '.join(parts[:3]) or 'no single one tells much'}; shares of the variance of the {of}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units, as ``--json`` prints it."""
+        """Verdicts as JSON-ready dict in SI units, as ``--json`` prints it."""
         parameters = [
             {
                 "parameter": one.parameter, "low": one.low, "high": one.high, "unit": one.unit, "stable": one.stable,
@@ -214,13 +213,13 @@ class Tolerated(ReadOnly):
 def tolerate(
     rig: Slider | Machine, tolerances: Mapping[str, Any] | Tolerances, *, along: str | None = None
 ) -> Tolerated:
-    """Verdicts on rigs whose parameters lie within tolerances, all varied at once and each alone.
+    """Verdicts on sampled rigs whose parameters lie within tolerances, all varied at once and each alone.
 
     Parameters
     ----------
     rig : Slider or Machine
     tolerances : mapping of str to float or str, or Tolerances
-        By dotted name the largest deviation to either side: a number in SI units, text with a unit, or a share of the
+        Largest deviation to either side by dotted name: a number in SI units, text with a unit, or a share of the
         value such as ``"5 %"``; also ``"+5 % -1 %"`` and ``"5 % (normal)"``. Or what
         `steadyslip.verdict.read_tolerances` gives.
     along : str, optional
@@ -275,9 +274,9 @@ def tolerate(
 
 
 def chance_of(stable: Array, possible: Array) -> tuple[float, float]:
-    """Share of stable rigs (m,) among the `possible` ones (GROUPS, n), and the half-width of its 95 % interval.
+    """Mean of `stable` (m,), for the m True entries of `possible` (GROUPS, n), and half-width of its 95 % interval.
 
-    Where all are judged alike, the interval is that of m independent draws, 3/m.
+    If all have one verdict, the half-width is that of m independent draws, 3/m.
     """
     table = np.full(possible.shape, np.nan)
     table[possible] = stable
@@ -286,7 +285,7 @@ def chance_of(stable: Array, possible: Array) -> tuple[float, float]:
 
 
 def differing_tolerances(first: Tolerated | None, second: Tolerated | None) -> list[str]:
-    """Parameters whose tolerances, and pairs whose correlations, are not those of the other, tolerances as shares."""
+    """Names of the parameters whose relative tolerances, and pairs whose correlations, differ between two rigs."""
     one, other = ({} if it is None else spreads_of(it.rig, it.tolerances).shapes() for it in (first, second))
     none = (np.nan,)
     return [
@@ -306,7 +305,7 @@ def format_chance(share: float, error: float) -> str:
 
 
 def _possible(spreads: Spreads, rigs: Mapping[str, Array]) -> dict[str, Array]:
-    """Those of several rigs whose numbers do not contradict each other."""
+    """Values by name of those `rigs` whose values are valid together."""
     if not rigs:
         return {}
     mask = np.broadcast_to(spreads.possible(rigs), next(iter(rigs.values())).shape)
@@ -314,7 +313,7 @@ def _possible(spreads: Spreads, rigs: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _ranges(judged: Sequence[_Outcomes]) -> dict[str, tuple[float, float]]:
-    """Least and largest edge, safety factor and growth rate of several sets of rigs, of what any of them has."""
+    """Least and largest finite edge, safety factor and growth rate over several sets of rigs, where any is finite."""
     found = {
         of: _finite_range(np.concatenate([getattr(one, of) for one in judged])) for of in ("edge", "safety", "growth")
     }
@@ -328,7 +327,7 @@ def _otherwise(
 
     Corners of the ranges are tried first, then values around the drawn rig, or corner, that is closest to the edge.
     """
-    sign = 1.0 if every.stable[0] else -1.0  # a growth rate of the other sign is sought
+    sign = 1.0 if every.stable[0] else -1.0  # search for a growth rate of the other sign
 
     def judged(rigs: Mapping[str, Array]) -> tuple[Array, Array]:
         mask = np.broadcast_to(spreads.possible(rigs), next(iter(rigs.values())).shape)
@@ -364,7 +363,7 @@ def _otherwise(
 
 
 def _share_of_variance(values: Array, target: Array) -> float:
-    """Share of the variance of the target (m,) between bins of the parameter's values (m,), without their noise."""
+    """Share of the variance of `target` (m,) explained by bins of `values` (m,), corrected for sampling noise."""
     known = np.isfinite(target)
     values, target = values[known], target[known]
     count = len(target)
@@ -376,7 +375,7 @@ def _share_of_variance(values: Array, target: Array) -> float:
 
 
 def log2_of(rig: Slider | Machine) -> int:
-    """Base-2 logarithm of the number of rigs in one group."""
+    """Base-2 logarithm of the number of rigs sampled in each group, by the cost of a verdict on this rig."""
     model = model_of(rig, ())
     return LOG2_CLOSED if model.has_closed_form else LOG2_LATE if model.delays else LOG2_OTHERS
 

@@ -1,4 +1,4 @@
-"""`stable_within`: at which values of parameters that are not known sliding is stable."""
+"""`stable_within`: values of unknown parameters at which sliding is stable."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 from steadyslip.verdict.chances import spread_over
 
-VALUES = 129  # of each interval, between which changes are looked for; a window narrower than 1 % of it may be missed
-HALVINGS = 40  # of the spacing, around each change: far below the digits told
-LOG2_RIGS = 10  # 2**10 rigs with all of several unknown parameters varied at once: shares to a few percent
+VALUES = 129  # values tried of each interval; a window narrower than 1 % of it may be missed
+HALVINGS = 40  # bisections of a spacing around each change: far below the digits printed
+LOG2_RIGS = 10  # log2 of rigs with all unknown parameters varied at once: shares to a few percent
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class ValuesWithin(Displayed):
     values : tuple of (float, float)
         Intervals in it where sliding is stable, rising.
     load : float or None
-        Normal force (N) in steady sliding by which a value in 1/m or s/m is one of the contact, N/m or N s/m.
+        Normal force (N) in steady sliding; multiplies values in 1/m or s/m to give N/m or N s/m of the contact.
     """
 
     parameter: str
@@ -51,10 +51,10 @@ class ValuesWithin(Displayed):
     values: tuple[tuple[float, float], ...]
     load: float | None = None
     written_as: WrittenAs = field(default=WrittenAs(), repr=False)
-    """How the rig's file writes the parameter."""
+    """Notation of the parameter in the rig's file, kept in printed values."""
 
     def shown(self, value: float) -> str:
-        """Format a value with its unit; per load also as the contact has it."""
+        """Format a value with its unit; a value per load also as that of the contact."""
         with told_as(self.written_as):
             text = format_quantity(value, self.unit)
         if self.load is None or self.unit not in PER_LOAD or " at " in text:
@@ -64,7 +64,7 @@ class ValuesWithin(Displayed):
 
     @property
     def given(self) -> str:
-        """The interval in words."""
+        """The interval as text."""
         return f"{self.shown(self.low)} to {self.shown(self.high)}"
 
     def __str__(self) -> str:
@@ -72,7 +72,7 @@ class ValuesWithin(Displayed):
 
     @property
     def told(self) -> str:
-        """The values in words."""
+        """Text on the stable values in the interval."""
         given = self.given
         if not self.values:
             return f"stable nowhere in {given}"
@@ -91,7 +91,7 @@ class ValuesWithin(Displayed):
 
 
 PER_LOAD = {"1/m": "N/m", "s/m": "N s/m"}
-"""Units per load, and those of a contact."""
+"""Unit of a contact's total by unit per normal load."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,7 @@ class StableWithin(ReadOnly):
 
     @property
     def at_once(self) -> str:
-        """Share of stable rigs over all intervals in words; empty for a single one."""
+        """Text on the share of stable rigs with all parameters varied at once; empty for a single parameter."""
         if len(self.each) == 1:
             return ""
         share = float(np.mean(self.stable))
@@ -133,7 +133,7 @@ class StableWithin(ReadOnly):
         return f"{words.get(share, part)} spread over the intervals"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, SI units."""
+        """Verdicts as JSON-ready dict, SI units."""
         return {
             "parameters": {
                 one.parameter: {"interval": [one.low, one.high], "stable": [list(part) for part in one.values]}

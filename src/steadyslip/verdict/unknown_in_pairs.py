@@ -1,4 +1,4 @@
-"""Two rigs at values of what is not known of them."""
+"""Pairs of rigs with values of their unknown parameters filled in."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from steadyslip.verdict.chances import values_tried
 
 Rig = Slider | Machine
 Intervals = Mapping[str, tuple[float, float]]
-ALIKE = 1e-12  # relative difference of ends of intervals that are the same: roundings of a conversion of units
+ALIKE = 1e-12  # relative difference of interval ends that counts as rounding of a conversion of units
 BOTH, FIRST, SECOND = "both", "first", "second"
 
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Pairs of rigs at values of what is not known.
+    """Pairs of rigs with all combinations tried of values of their unknown parameters.
 
     Attributes
     ----------
     of_first, of_second : mapping of str to (float, float)
-        Intervals of either rig, SI units.
+        Intervals of each rig's unknown parameters, SI units.
     shared : tuple of str
-        Names of those that are the same of both: one thing that is not known, such as of one guide.
+        Names of unknown parameters with one interval in both rigs: they vary together, such as for a common guide.
     tried : tuple of (Slider or Machine, Slider or Machine)
-        One pair of rigs where all is known.
+        A single pair without unknown parameters.
     """
 
     of_first: Intervals
@@ -39,17 +39,17 @@ class Pairs:
 
     @property
     def apart(self) -> tuple[str, ...]:
-        """Names of what is not known of one rig, or of both within other intervals."""
+        """Names of the parameters unknown in one rig only, or in both within different intervals."""
         return tuple(name for name in {**self.of_first, **self.of_second} if name not in self.shared)
 
     def stability(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Verdicts on either rig at the values tried."""
+        """Verdicts on the first rig, and on the second, at the values tried."""
         first, second = (tuple(str(stability(one)) for one in rigs) for rigs in zip(*self.tried, strict=True))
         return first, second
 
 
 def pairs_of(own: tuple[Rig, Rig], made: tuple[Rig, Rig], intervals: tuple[Intervals, Intervals]) -> Pairs:
-    """Pairs of the rigs `made` of two so that they can be compared, at values within the intervals of these."""
+    """`Pairs` of the comparable forms `made` of two rigs, with values from the intervals of the rigs `own`."""
     first, second = (
         {name: _converted(rig, other, name, ends) for name, ends in of.items()}
         for rig, other, of in zip(own, made, intervals, strict=True)
@@ -68,7 +68,7 @@ def _at(rig: Rig, values: Mapping[tuple[str, str], float], which: str) -> Rig:
 
 
 def _converted(rig: Rig, made: Rig, name: str, ends: tuple[float, float]) -> tuple[float, float]:
-    """Ends of an interval of a rig in the quantities of one made of it: stresses, or totals of the contact."""
+    """Ends of an interval of `rig`, converted to the quantities of its comparable form `made`: stresses or totals."""
     total = made.area == 1.0 != rig.area and is_per_area(rig.parameters()[name].role.unit)
     factor = float(rig.area or 1.0) if total else 1.0
     return factor * ends[0], factor * ends[1]

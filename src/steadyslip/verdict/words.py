@@ -1,4 +1,4 @@
-"""Words of verdicts: headline, clauses on disturbances, onset and kicks, table of nearest edges."""
+"""Text of verdicts: headline, clauses on disturbances, onset and kicks, table of nearest edges."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ EDGE_WORDS = {
     "beside": "on the edge, stable {side} it",
     "far": "further off than a factor of {remote}",
 }
-"""Phrases of the table of nearest edges beside those in `BEYOND`; pages use both."""
+"""Phrases of the table of nearest edges, besides those in `BEYOND`; browser pages use both."""
 
 PACE = {"grows": "doubles in {time}", "decays": "halves in {time}", "stays": "neither grows nor dies"}
-"""Phrases on how fast a disturbance changes; pages and reports use the same."""
+"""Phrases on how fast a disturbance changes; browser pages and reports use the same."""
 
 EIGENVALUE_COLUMNS = ("rate", "period", "size")
 NO_PERIOD = "none"
-"""Head of a table of eigenvalues, and the period of one that does not oscillate; pages and reports use the same."""
+"""Column heads of a table of eigenvalues, and text for the period of a real one; pages and reports use the same."""
 
 
 def eigenvalue_row(s: complex) -> tuple[str, str, str]:
@@ -69,7 +69,7 @@ def eigenvalue_row(s: complex) -> tuple[str, str, str]:
 
 
 STABLE_MEANS = "Stable means: small disturbances die out. A large enough kick may still start {what}."
-"""What the verdict "stable" leaves open, with a hole for what a large kick may start; pages say it too."""
+"""Limits of the verdict "stable"; {what} is what a large kick may start. Browser pages use the same sentence."""
 
 
 def beyond(edge: Boundary) -> str:
@@ -79,11 +79,11 @@ def beyond(edge: Boundary) -> str:
 
 
 JUDDERS = "steadyslip simulate shows what it does instead: how often it slips, how far, and with what force."
-"""Line on an unstable rig whose motion mass or damping limits, where no slip events were found to repeat."""
+"""Line on an unstable rig for which no motion in words was found; see `Findings.judders`."""
 
 
 def instead(analysis: Findings) -> str:
-    """Line on what an unstable rig does instead of sliding steadily."""
+    """Line on the motion of an unstable rig, or on how to simulate it."""
     return f"{analysis.judders} (simulated, after a small disturbance)" if analysis.judders else JUDDERS
 
 
@@ -95,12 +95,12 @@ HEADLINES = {
     "none": ("No steady sliding", " {speed}"),
     "undecided": ("Not decided", ": steady sliding {speed}"),
 }
-"""First line of a verdict: the part in capitals, and the rest; pages use the same words."""
+"""First line of a verdict by kind: the part in capitals, and the rest; browser pages use the same words."""
 
 
 def headline(analysis: Findings, capitals: bool = True) -> str:
     """First line of a verdict: stable, unstable, on the edge, not decided, or no steady sliding; with the speed."""
-    speed = told(analysis.rig, "drive.velocity", float(analysis.rig.drive.velocity))
+    speed = format_parameter(analysis.rig, "drive.velocity", float(analysis.rig.drive.velocity))
     if analysis.stable is None:
         kind = "undecided" if is_undecided(analysis) else "none"
     else:
@@ -110,16 +110,16 @@ def headline(analysis: Findings, capitals: bool = True) -> str:
     return (first.upper() if capitals else first) + rest.format(speed=f"at {speed}")
 
 
-def told(rig: Rig, name: str, value: float, beside: float | None = None) -> str:
-    """Value of a parameter in words, with as many digits as tell it from another `beside` it."""
+def format_parameter(rig: Rig, name: str, value: float, beside: float | None = None) -> str:
+    """Format a value of a parameter in the unit of the rig's file, with enough digits to differ from `beside`."""
     digits = 4 if beside is None else digits_apart(value, beside)
     own, (number, unit) = rig.told(name, rig.parameters()[name].value or 0.0)[0], rig.told(name, value)
     with told_as(rig.written_as(name)):
         return format_as_written(number, own, unit, digits, area=rig.printed_area(name))
 
 
-def told_range(rig: Rig, name: str, low: float, high: float) -> str:
-    """Range of a parameter in words."""
+def format_parameter_range(rig: Rig, name: str, low: float, high: float) -> str:
+    """Format a range of a parameter in the unit of the rig's file."""
     (first, unit), (last, _) = rig.told(name, low), rig.told(name, high)
     with told_as(rig.written_as(name)):
         return format_range(first, last, unit, rig.printed_area(name))
@@ -131,9 +131,9 @@ def is_undecided(analysis: Findings) -> bool:
 
 
 def stable_speeds(analysis: Findings) -> list[tuple[str, str]]:
-    """Row (label, text) of all drive velocities at which sliding is stable.
+    """Row (label, text) on all drive velocities at which sliding is stable.
 
-    None where they were not searched, and of a rig in stresses whose stability does not depend on them.
+    No row if they were not searched, nor for a rig in stresses whose stability does not depend on them.
     """
     rig, margin = analysis.rig, next((one for one in analysis.margins if one.parameter == "drive.velocity"), None)
     if margin is None:
@@ -141,7 +141,7 @@ def stable_speeds(analysis: Findings) -> list[tuple[str, str]]:
     if not margin.edges:
         if analysis.stable is None or analysis.on_edge or not (rig.in_forces or rig.area is not None):
             return []
-        searched = " to ".join(told(analysis.rig, margin.parameter, end) for end in margin.searched)
+        searched = " to ".join(format_parameter(analysis.rig, margin.parameter, end) for end in margin.searched)
         return [("stable speeds", f"{'all' if analysis.stable else 'none'} (searched from {searched})")]
     ends = [0.0, *(edge.value for edge in margin.edges), math.inf]
     below = [edge.stable == "below" for edge in margin.edges] + [False]
@@ -150,14 +150,14 @@ def stable_speeds(analysis: Findings) -> list[tuple[str, str]]:
     windows = [between for between, up_to_its_end, from_its_start in sides if up_to_its_end or from_its_start]
     parts = []
     for low, high in windows:
-        first, last = (told(analysis.rig, margin.parameter, end) for end in (low, high))
+        first, last = (format_parameter(analysis.rig, margin.parameter, end) for end in (low, high))
         parts.append(f"above {first}" if high == math.inf else f"{first} to {last}" if low else f"below {last}")
-    none = f"none up to {told(analysis.rig, margin.parameter, margin.searched[1])}"
+    none = f"none up to {format_parameter(analysis.rig, margin.parameter, margin.searched[1])}"
     return [("stable speeds", ", or ".join(parts) or none)]
 
 
 def onset_words(onset: Onset) -> str:
-    """Sentence on the kind of onset; for a subcritical one with the size of the unstable oscillation at this rig."""
+    """Sentence on the kind of onset; if subcritical, with the size of the unstable oscillation for this rig."""
     text = f"{onset.kind}: {_ONSETS[onset.kind]}"
     if onset.rig.default_along is None:
         text = text.replace("edge in stiffness", f"edge in {said(onset.rig, onset.along)}")
@@ -224,7 +224,7 @@ def disturbance(analysis: Findings) -> str:
         text = PACE["grows"].format(time=format_quantity(analysis.time_to_double, "s"))
     elif analysis.time_to_halve is not None:
         text = PACE["decays"].format(time=format_quantity(analysis.time_to_halve, "s"))
-    else:  # the sign of the leading root is known, its size is lost in rounding
+    else:  # only the sign of the leading root is above rounding
         return f"{'dies away' if analysis.stable else 'grows'} too slowly for a rate to be told from rounding"
     if not analysis.eigenvalues:
         return f"{text} at the slowest, infinitely many oscillations nearly alike"
@@ -236,12 +236,12 @@ def disturbance(analysis: Findings) -> str:
 
 
 def edge_rows(analysis: Findings, margin: Margin) -> list[tuple[str, str, str, str, str]]:
-    """Rows (name, value, edge, change, what happens beyond) of the edges about a value, nearest first."""
+    """Rows (name, value, edge, change, what happens beyond) for the edges next to the rig's value, nearest first."""
     return [_margin_row(analysis, margin, edge) for edge in margin.about]
 
 
 def margin_table(analysis: Findings) -> list[str]:
-    """Lines of the table of nearest edges, one parameter varied at a time; those beyond a factor `REMOTE` last."""
+    """Lines of the table of nearest edges, one parameter varied at a time; edges beyond a factor `REMOTE` last."""
     if not analysis.margins:
         return []
     lines = ["", "Nearest edges in each parameter, the others unchanged, and what happens beyond them"]
@@ -266,7 +266,7 @@ def margin_table(analysis: Findings) -> list[str]:
 
 
 def change_to(margin: Margin, edge: Boundary) -> str:
-    """Change of a parameter to an edge: in degrees, percent or as a factor."""
+    """Format the change of a parameter to an edge: in degrees, percent or as a factor."""
     gap = edge.value - margin.value
     if margin.unit == "rad":
         return f"{math.degrees(gap):+.4g} deg"
@@ -294,8 +294,8 @@ def _margin_row(analysis: Findings, margin: Margin, edge: Boundary) -> tuple[str
         words = beyond(edge)
     return (
         margin.parameter,
-        told(analysis.rig, margin.parameter, margin.value, edge.value),
-        told(analysis.rig, margin.parameter, edge.value, margin.value),
+        format_parameter(analysis.rig, margin.parameter, margin.value, edge.value),
+        format_parameter(analysis.rig, margin.parameter, edge.value, margin.value),
         change,
         words,
     )

@@ -1,6 +1,7 @@
-"""Figures: each takes a rig or a result and ``ax=None``, returns the Axes, labels with units and never shows.
+"""Figures: each function takes a rig or a result and ``ax=None``, draws with units and returns the Axes.
 
-The only part of the package that imports matplotlib. What ``result.plot()`` draws is registered below.
+Figures are never displayed or closed here. Only this folder imports matplotlib. Figures that ``result.plot()`` draws
+are registered below.
 """
 
 from __future__ import annotations

@@ -18,14 +18,14 @@ from steadyslip.linear.nearness import ends_about
 from steadyslip.machine.slider import Slider
 
 _RANGE_FACTOR = 20.0  # default range of a positive parameter: value / 20 to value x 20 (by trial)
-_BESIDE_EDGE = 2.0  # what the range of a positive parameter reaches beyond the nearest edge, a factor (by trial)
+_BESIDE_EDGE = 2.0  # factor by which the default range extends beyond the nearest edge (by trial)
 _MAX_EDGE_RATIO = 1e3  # edges further from the value than this factor do not widen the default range (by trial)
 _EXCLUDED_END_MARGIN = 1 / 18  # share of a domain left out at each excluded end: 10 deg of 180 for an angle
 
 
 @dataclass(frozen=True)
 class ChartAxis:
-    """Axis of a stability chart for one parameter; values in SI units unless converted by `shown`.
+    """Axis of a stability chart for one parameter; values in SI units unless converted by `displayed`.
 
     Attributes
     ----------
@@ -33,10 +33,11 @@ class ChartAxis:
         Full dotted name.
     low, high : float
     log : bool
+        True if logarithmic.
     factor : float
-        Size of the unit shown, in SI units.
+        Size of the display unit, in SI units.
     label : str
-        Name and unit.
+        Axis label: name and unit.
     """
 
     name: str
@@ -47,13 +48,13 @@ class ChartAxis:
     label: str
 
     def at(self, share: Any) -> Any:
-        """SI value at a fraction (0 to 1) of the drawn length of the axis."""
+        """SI values at fractions (0 to 1, any shape) of the length of the axis as drawn."""
         share = np.asarray(share, float)
         inner = self.low * (self.high / self.low) ** share if self.log else self.low + (self.high - self.low) * share
         return np.clip(inner, self.low, self.high)
 
-    def shown(self, value: Any) -> Any:
-        """Convert an SI value to the display unit of the axis."""
+    def displayed(self, value: Any) -> Any:
+        """SI values converted to the display unit of the axis."""
         return value / self.factor
 
 
@@ -65,7 +66,7 @@ def chart_axis(rig: Slider, name: str, limits: Sequence[Any] | None) -> ChartAxi
     UnknownNameError, ParameterError
         If the name is unknown, the rig does not have the parameter, or the range is not allowed.
     NotAvailable
-        If the rig offers no scale for the parameter: it is zero and has no edge.
+        If no default range exists: the parameter is zero and has no edge.
     """
     full = rig.resolve(name)
     address = rig.parameters()[full]
@@ -90,7 +91,7 @@ def _checked_range(name: str, role: Parameter, limits: Sequence[Any]) -> tuple[f
 
 
 def _default_range(rig: Slider, name: str, role: Parameter, value: float) -> tuple[float, float]:
-    """Default range (SI): all of a bounded domain, otherwise a range around the rig's value and the nearest edge."""
+    """Default range (SI): a bounded domain as a whole, otherwise a range around the rig's value and nearest edge."""
     domain = role.domain
     if np.isfinite(domain.high):
         margin = _EXCLUDED_END_MARGIN * (domain.high - domain.low)

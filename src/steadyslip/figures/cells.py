@@ -1,4 +1,4 @@
-"""Words and edges of areas of one kind each, on grids whose kinds are known at their points only."""
+"""Outlines and labels of areas on a grid where each point has one of several kinds."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.palette import BLACK
 from steadyslip.figures.chart import write_inside
 
-_FINE = 161  # points along each axis from which room for words is measured: half of a letter of 7 points in 85 mm
+_FINE = 161  # points along each axis at which room for words is measured: half a 7-point letter in 85 mm
 
 
 def mark_areas(ax: Axes, x: Array, y: Array, kinds: Array, words: Mapping[int, str]) -> None:
-    """Draw a line between cells of different kinds, and write the word of each kind into its areas that have room.
+    """Draw lines between cells of different kinds, and write each kind's word into its areas where it fits.
 
-    Cells reach halfway to the next points, as those of ``pcolormesh(shading="nearest")``. Scales and limits of the axes
-    are set before. `kinds`, shape (len(y), len(x)), has integers; those without a word get none.
+    Cells extend halfway to the next points, as with ``pcolormesh(shading="nearest")``. Scales and limits of the axes
+    must be set before. `kinds`, shape (len(y), len(x)), are integers; kinds that are not in `words` get no word.
     """
     bounds = [0.5 * (one[1:] + one[:-1]) for one in (x, y)]
     line = _borders(x, y, bounds, kinds)
@@ -33,13 +33,13 @@ def mark_areas(ax: Axes, x: Array, y: Array, kinds: Array, words: Mapping[int, s
 
 
 def _in_data(ax: Axes, shares: Array) -> tuple[Array, Array]:
-    """Coordinates of points at fractions of the axes, shape (n, 2)."""
+    """Data coordinates x and y, each (n,), of points given as fractions of the axes, shape (n, 2)."""
     points = np.asarray(ax.transData.inverted().transform(ax.transAxes.transform(shares)))
     return points[:, 0], points[:, 1]
 
 
 def _borders(x: Array, y: Array, bounds: list[Array], kinds: Array) -> Array:
-    """Sides of cells whose two kinds differ, as points (n, 2) with NaN between them."""
+    """Borders between cells of different kinds, as points (n, 2) with NaN between the line segments."""
     left, low = (np.concatenate([one[:1], mid]) for one, mid in zip((x, y), bounds, strict=True))
     right, high = (np.concatenate([mid, one[-1:]]) for one, mid in zip((x, y), bounds, strict=True))
     row, column = np.nonzero(kinds[:, 1:] != kinds[:, :-1])

@@ -36,13 +36,10 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import explain_absence
 
-_CONTOUR_POINTS_LATE = 61  # along each axis: delays cost some 0.1 ms a point (measured)
-_STEPS = 8  # points of a piece of a line that are kept clear of words (by trial)
-_LETTER, _LINE = (
-    0.0105,
-    0.045,
-)  # half a letter's width and a line's height with its halo, share of the axes of a new figure
-_SAMPLES = 12  # points at which the reason for no steady sliding is computed: time against missing a reason (by trial)
+_CONTOUR_POINTS_LATE = 61  # points along each axis for rigs with delays: some 0.1 ms a point (measured)
+_STEPS = 8  # points per segment of a line at which words are kept away (by trial)
+_LETTER, _LINE = 0.0105, 0.045  # half a letter's width, a line's height with halo: fractions of a new figure's axes
+_SAMPLES = 12  # most points at which the reason for no steady sliding is computed (by trial: time)
 
 
 def stability_chart(
@@ -66,7 +63,7 @@ def stability_chart(
         Parameters on the axes: dotted names, or unique last parts.
     ax : matplotlib.axes.Axes, optional
     x_range, y_range : (low, high), optional
-        SI units, or text such as ``"10 deg"``. By default the domain of angles and shares, otherwise around
+        SI numbers, or text such as ``"10 deg"``. By default the domain of angles and shares, otherwise around
         the rig's own value with its nearest edge in view. An axis is logarithmic where its range is
         positive and spans more than two decades.
     points : int
@@ -75,7 +72,7 @@ def stability_chart(
     Returns
     -------
     matplotlib.axes.Axes
-        Angles in degrees, other units with the prefix that suits; the rig's own point is marked if in view.
+        Angles in degrees, other units with a suitable prefix; the rig's own point is marked if in view.
 
     Raises
     ------
@@ -113,7 +110,7 @@ def stability_chart(
     reasons = _absence_reasons(rig, first, second, grid)
     absent = ~np.isin(grid, SLIDING)
     slides, far = regions.carried(grid, absent)
-    for code, (words, style) in AREAS.items():  # the areas of no steady sliding last, on top
+    for code, (words, style) in AREAS.items():  # areas without steady sliding come last, on top
         path = regions.region_path(
             inside(code), (slides if code in SLIDING else grid) == code, ~absent | (code not in SLIDING)
         )
@@ -144,10 +141,11 @@ Place = Callable[[Any], tuple[Any, Any]]  # fractions of the axes, shape (n, 2),
 def draw_edges(
     ax: Axes, rig: Slider | Machine, line: Any, vary: Callable[[Any, Any], Any], place: Place, within: Any = None
 ) -> None:
-    """Draw the edge of stability, with the style of what begins beyond it: of the least damped disturbance on it.
+    """Draw the edge of stability in the style of the disturbance that grows beyond it (oscillation or drift).
 
-    `line` has its points in fractions of the axes, shape (n, 2), NaN between pieces; `vary` gives the parameters there.
-    It ends at the outline `within`, a path in the units of the axes, if any.
+    That is the least damped one at each point of the edge. `line`, shape (n, 2), has points in fractions of the axes,
+    NaN between pieces; `vary` returns the parameters at such points. The line is clipped to the outline `within`, a
+    path in the units of the axes, if given.
     """
     kinds = np.full(len(line), "", dtype="<U16")
     known = np.flatnonzero(np.isfinite(line[:, 0]))
@@ -159,7 +157,7 @@ def draw_edges(
     least = np.take_along_axis(roots, np.argmin(rates, axis=-1)[:, None], axis=-1)[:, 0]
     kinds[known] = np.where(np.abs(least.imag) > np.abs(least.real), "oscillation", "drift")
     good = known[np.isfinite(roots).any(axis=-1)]
-    if len(good):  # points beyond the outline are of the kind of the nearest one within
+    if len(good):  # points without eigenvalues get the kind of the nearest with
         kinds[known] = kinds[good[np.argmin(np.abs(known[:, None] - good), axis=1)]]
     for kind in ("oscillation", "drift"):
         here = kinds == kind
@@ -174,9 +172,9 @@ def draw_edges(
 def _draw_contours(
     ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any, within: Any, edges: Sequence[Any]
 ) -> list[Any]:
-    """Draw contours of k/k_cr over a chart whose statuses are `grid`; return their lines, as vertices (n, 2).
+    """Draw contours of k/k_cr over a chart with status codes `grid`; return their lines, as vertices (n, 2).
 
-    They end at the outline `within` of steady sliding, if any; their labels keep clear of `edges`.
+    They are clipped to the outline `within` of steady sliding, if given; their labels keep clear of `edges`.
     """
     model = operating_point(rig).model
     late = bool(model.delays)
@@ -189,19 +187,19 @@ def _draw_contours(
     here = status_of(operating_point(rig, vary, scan=True)) if fine else grid[np.ix_(*2 * [chosen.astype(int)])]
     values = None
     with suppress(NotAvailable, ParameterError), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of delays too long to be judged: there are no contours there
-        along = rig.parameter_along("stiffness") if late else None  # a late gain is no stiffness
+        warnings.simplefilter("ignore")  # delays too long for a verdict: no contours there
+        along = rig.parameter_along("stiffness") if late else None  # a delayed gain does not act as a stiffness
         values = safety_factor(rig, vary, along=along)
     if values is None or not np.isfinite(values).any():
         return []
     absent = ~np.isin(here, SLIDING)
-    status = np.where(np.isnan(values), ABSENT, here) if late else here  # NaN of a delay may be "not known"
+    status = np.where(np.isnan(values), ABSENT, here) if late else here  # with delays NaN may mean unknown
     fields = [extended(one, absent) for one in safety_fields(np.where(absent, np.nan, values), status)]
     own = [rig.value(axis.name) for axis in (x, y)]
-    marked = [] if None in own else [np.array([[axis.shown(v) for axis, v in zip((x, y), own, strict=True)]])]
+    marked = [] if None in own else [np.array([[axis.displayed(v) for axis, v in zip((x, y), own, strict=True)]])]
     levels = [level for level in SAFETY_LEVELS if level != 1]
     lines = draw_levels(
-        ax, x.shown(x.at(share)), y.shown(y.at(share)), fields, [one / (1 + one) for one in levels],
+        ax, x.displayed(x.at(share)), y.displayed(y.at(share)), fields, [one / (1 + one) for one in levels],
         [f"{one:g}" for one in levels], within, [*marked, *edges],
     )  # fmt: skip
     if lines:
@@ -210,10 +208,10 @@ def _draw_contours(
 
 
 def write_inside(ax: Axes, region: Any, words: str, place: Place, lines: Sequence[Any] = ()) -> bool:
-    """Write words into the widest place of each area of a region, upright if they fit only so; True if any has room.
+    """Write words into the widest place of each connected area of a region; True if they fit into any.
 
-    `region` is true inside, shape (rows, columns); `place` gives the units of the axes for fractions of them, (n, 2).
-    Words keep clear of `lines`, vertices (n, 2) each, if they can.
+    They are written vertically where they fit only so. `region` is True inside, shape (rows, columns); `place` converts
+    fractions of the axes, (n, 2), to their units. Words keep clear of `lines`, vertices (n, 2) each, if possible.
     """
     from scipy.ndimage import label
 
@@ -250,12 +248,12 @@ def _write_in_area(ax: Axes, region: Any, words: str, place: Place, lines: Seque
 
 
 def _in_axes(ax: Axes, points: Any) -> Any:
-    """Points, (n, 2), in fractions of the axes."""
+    """Fractions of the axes of points in data coordinates, both (n, 2)."""
     return ax.transAxes.inverted().transform(ax.transData.transform(points))
 
 
 def _absence_reasons(rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any) -> str:
-    """Reasons for no steady sliding (lock-up, lift-off), from up to `_SAMPLES` points of the chart without it."""
+    """Text of reasons for no steady sliding (lock-up, lift-off), from up to `_SAMPLES` points without it."""
     share = np.linspace(0, 1, len(grid))
     b, a = np.nonzero(grid == ABSENT)
     if not len(a):
@@ -265,26 +263,26 @@ def _absence_reasons(rig: Slider, x: ChartAxis, y: ChartAxis, grid: Any) -> str:
 
 
 def absence_reasons(rig: Slider | Machine, points: Sequence[dict[str, float]]) -> str:
-    """Reasons for no steady sliding at the given points (parameter name to SI value), each once, comma-separated."""
+    """Text of the distinct reasons for no steady sliding at points (SI value by parameter), comma-separated."""
     found = [explain_absence(rig.with_values(vary), operating_point(rig, vary)).condition for vary in points]
     return ", ".join(sorted(set(found)))
 
 
 def _display_points(shares: Any, x: ChartAxis, y: ChartAxis) -> tuple[Any, Any]:
-    return x.shown(x.at(shares[:, 0])), y.shown(y.at(shares[:, 1]))
+    return x.displayed(x.at(shares[:, 0])), y.displayed(y.at(shares[:, 1]))
 
 
 def _mark_own(ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis) -> None:
     own = [rig.value(x.name), rig.value(y.name)]
     if all(v is not None and a.low <= v <= a.high for v, a in zip(own, (x, y), strict=True)):
-        at = [x.shown(own[0])], [y.shown(own[1])]
+        at = [x.displayed(own[0])], [y.displayed(own[1])]
         ax.plot(*at, "o", **OWN_RIG)
 
 
 def _set_axes(ax: Axes, x: ChartAxis, y: ChartAxis) -> None:
     ax.set_xscale("log" if x.log else "linear")
     ax.set_yscale("log" if y.log else "linear")
-    ax.set_xlim(x.shown(x.low), x.shown(x.high))
-    ax.set_ylim(y.shown(y.low), y.shown(y.high))
+    ax.set_xlim(x.displayed(x.low), x.displayed(x.high))
+    ax.set_ylim(y.displayed(y.low), y.displayed(y.high))
     ax.set_xlabel(x.label)
     ax.set_ylabel(y.label)

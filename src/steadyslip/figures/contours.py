@@ -1,4 +1,4 @@
-"""Contours of k/k_cr over a plane of two parameters: smooth, and as far as the edges of steady sliding."""
+"""Contours of k/k_cr over a plane of two parameters, smooth up to the edges of steady sliding."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from steadyslip.figures.style import CONTOURS, HALO
 from steadyslip.linear.status import STABLE, UNSTABLE
 
 SAFETY_LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-"""Contours of the safety factor k/k_cr."""
-_FALL = (
-    1.7  # ratio of values two and one points away from which on the next may be zero: 2 of straight lines, with room
-)
-_ROUNDING = 1e-6  # of that share at its edge, where the status depends on rounding: 1e10 times that of a double
-_ROOM = 24.0  # pixels between a label of a contour and the next line (by trial)
-_BESIDE = 0.017  # mean distance to the edge or a contour, over the width of a figure, below which a piece of another
-# contour is not drawn (by trial)
-_CLOSE = 6.0  # pixels between vertices of a label's line (by trial)
+"""Contour levels of the safety factor k/k_cr."""
+_FALL = 1.7  # ratio of a field two points away to one point away above which it may be zero here; straight lines: 2
+_ROUNDING = 1e-6  # |share - 0.5| within which status depends on rounding: 1e10 times that of a double
+_ROOM = 24.0  # least distance in pixels between a contour's label and another line (by trial)
+# Median distance to an edge or another contour, over the width of a figure, below which a piece of a contour is left
+# out (by trial).
+_BESIDE = 0.017
+_CLOSE = 6.0  # least distance in pixels between vertices kept by `_thinned` (by trial)
 
 
 def safety_fields(factor: Array, status: Array) -> list[Array]:
-    """Shares k/(k + k_cr) over a plane, (rows, columns), from k/k_cr: of lower limits of stiffness, of upper limits.
+    """Fields k/(k + k_cr), (rows, columns), from k/k_cr: one where k_cr is a lower limit of stable k, one where it
+    is an upper limit.
 
-    It is bounded, so that contours go on where k_cr is zero or infinite: 1 where sliding is stable at every stiffness
-    and 0 where it is at none. NaN where the nearest limit is of the other kind and where nothing is known.
+    k/(k + k_cr) is bounded, so that contours continue where k_cr is zero or infinite: 1 where every stiffness is
+    stable, 0 where none is. NaN where the nearest limit is of the other kind, and where nothing is known.
     """
     with np.errstate(invalid="ignore"):
         share = np.where(np.isinf(factor), 1.0, factor / (1 + factor))
@@ -46,7 +46,7 @@ def safety_fields(factor: Array, status: Array) -> list[Array]:
 
 
 def extended(field: Array, missing: Array) -> Array:
-    """Field carried on by one grid spacing, in straight lines, into places where it is missing."""
+    """Field extrapolated linearly by one grid spacing into points of the mask `missing`."""
     near = [np.stack(values) for values in zip(*_neighbours(field), strict=True)]
     straight = 2 * near[0] - near[1]
     with np.errstate(invalid="ignore"):
@@ -55,7 +55,7 @@ def extended(field: Array, missing: Array) -> Array:
 
 
 def _vanishes(field: Array) -> Array:
-    """True where a field is not known nor known nearby, or falls to zero between its nearest point and here."""
+    """Mask of points without a known neighbour, or towards which the field, extrapolated linearly, falls to zero."""
     known, falls = np.zeros(field.shape, bool), np.zeros(field.shape, bool)
     for one, two in _neighbours(field):
         known |= np.isfinite(one)
@@ -64,7 +64,7 @@ def _vanishes(field: Array) -> Array:
 
 
 def _neighbours(field: Array) -> Iterator[tuple[Array, Array]]:
-    """Values one and two grid points away in eight directions, NaN outside."""
+    """Pairs of fields shifted by one and by two grid points, in eight directions; NaN outside."""
     rows, columns = field.shape
     padded = np.pad(field, 2, constant_values=np.nan)
     for step in product((-1, 0, 1), repeat=2):
@@ -77,10 +77,10 @@ def draw_levels(
     ax: Axes, x: Array, y: Array, fields: Sequence[Array], levels: Sequence[float], words: Sequence[str], within: Any,
     beside: Sequence[Array] = (), **style: Any,
 ) -> list[Array]:  # fmt: skip
-    """Draw contours of fields over a plane with a label each; return the lines drawn, as vertices (n, 2).
+    """Draw labelled contours of fields over a plane; return the lines drawn, as vertices (n, 2).
 
-    They end at the outline `within`, a path in the units of the axes or None. Labels keep clear of the lines `beside`;
-    pieces of contours that run along one of these, or along another contour, are left out.
+    They are clipped to the outline `within`, a path in the units of the axes or None. Labels keep clear of the lines
+    `beside`; pieces of contours that run along one of these, or along another contour, are left out.
     """
     drawn, clip = [], None if within is None else PathPatch(within, transform=ax.transData, visible=False)
     for field in fields:
@@ -90,7 +90,7 @@ def draw_levels(
         drawing = CONTOURS | style
         lines = ax.contour(x, y, field, levels=[levels[n] for n in shown], **drawing)
         pieces = _not_along(ax, [pieces_of(path) for path in lines.get_paths()], beside)
-        if not all(pieces):  # again without the levels of which nothing is left, which have no label
+        if not all(pieces):  # redraw without the levels that are left out entirely
             lines.remove()
             shown = [n for n, several in zip(shown, pieces, strict=True) if several]
             pieces = [several for several in pieces if several]
@@ -115,16 +115,16 @@ def draw_levels(
 
 
 def pieces_of(path: Path) -> list[Array]:
-    """Pieces of a path of straight lines, vertices (n, 2) each; `Path.to_polygons` would thin them out."""
+    """Pieces of a path of straight lines, each (n, 2) with all vertices; `Path.to_polygons` would drop some."""
     vertices = np.asarray(path.vertices)
     starts = [0] if path.codes is None else np.flatnonzero(path.codes == Path.MOVETO)
     return [piece for piece in np.split(vertices, starts[1:]) if len(piece) > 1]
 
 
 def _not_along(ax: Axes, contours: Sequence[Sequence[Array]], beside: Sequence[Array]) -> list[list[Array]]:
-    """Pieces of the contours that keep `_BESIDE` from the lines `beside` and from each other.
+    """Pieces of the contours that keep the distance `_BESIDE` from the lines `beside` and from each other.
 
-    Of two that do not, the one is kept that is farther from these lines.
+    Of two pieces too close together that farther from the lines `beside` is kept.
     """
     least = _BESIDE * ax.get_figure(root=True).bbox.width  # type: ignore[union-attr]
 
@@ -148,7 +148,7 @@ def _not_along(ax: Axes, contours: Sequence[Sequence[Array]], beside: Sequence[A
 
 
 def _apart(ax: Axes, line: Array, others: Sequence[Array], labels: Sequence[Array]) -> tuple[float, float]:
-    """Vertex of a line with `_ROOM` to other lines, and twice that to labels; the nearest to its middle if several."""
+    """Vertex for a label, (x, y): at least `_ROOM` from other lines and twice that from labels, nearest to mid-line."""
     seen = ax.transData.transform(line)
     inside = np.all(np.abs(ax.transAxes.inverted().transform(seen) - 0.5) < 0.45, axis=1)
     beside = [(_thinned(ax.transData.transform(one)), 0.0) for one in others]
@@ -160,6 +160,6 @@ def _apart(ax: Axes, line: Array, others: Sequence[Array], labels: Sequence[Arra
 
 
 def _thinned(line: Array) -> Array:
-    """Vertices of a line that are some `_CLOSE` pixels apart at least, its first and last among them."""
+    """Line thinned to vertices about `_CLOSE` pixels apart, with its first and last."""
     gone = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))]) // _CLOSE
     return np.asarray(line[np.concatenate([[True], np.diff(gone) > 0]) | (np.arange(len(line)) == len(line) - 1)])

@@ -1,4 +1,4 @@
-"""Frequency response (Bode plot) of a rig, and stability at each moment of a slow change."""
+"""Figures of the frequency response (Bode plot) of a rig, and of stability at each moment of a slow change."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
 
 _MARKERS = ("o", "s", "^", "D", "v")
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE)
-BESIDE = 0.2  # share of the period of a resonance, to each side, within which curves have more points
+BESIDE = 0.2  # range to each side of a resonance, as share of its period, in which curves have more points
 HALF_TURN = 180.0  # degrees; a larger jump of phase is a turn by 360
 
 
 def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
-    """Plot gain and phase over the period: linear response as lines, finite amplitudes as marks with their mean shift.
+    """Plot gain and phase over the period: linear response as lines, finite amplitudes as marks.
 
-    Where limits were asked for, beneath: the amplitudes up to which the answer is linear, and from which sliding is
-    lost.
+    Further panels: shift of the mean at finite amplitudes; if the response has limits, the amplitudes up to which it is
+    linear and from which sliding is lost.
 
     Parameters
     ----------
     found : FrequencyResponse
     ax : sequence of matplotlib.axes.Axes, optional
-        For gain, phase, the shift of the mean if the response has finite amplitudes, and limits if it has them.
+        For gain, phase, then shift of the mean (with finite amplitudes) and limits (if the response has them).
 
     Returns
     -------
@@ -122,7 +122,7 @@ def _limits(found: FrequencyResponse, ax: Any) -> None:
 
 
 def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:
-    """Plot growth rate over time, with unstable times shaded, and the slip rate of the motion in a second panel.
+    """Plot growth rate over time, with unstable times shaded, and in a second panel the slip rate of the motion.
 
     Parameters
     ----------

@@ -17,10 +17,11 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.figures.style import JOURNAL, fit_words
 
 MAX_SVG_LENGTH = 90_000  # characters; a longer SVG is replaced by a PNG, so that pages stay small (by trial)
-_LEAST = 640.0  # pixels across a figure, so that one column is sharp on a screen of two per CSS pixel (by trial)
-_LARGE = 6.0  # inches across from which letters are too small on a telephone, where such figures scroll instead
-_LEAST_SCALE = 0.83  # of a figure that is made narrower: letters keep their size, and leave no room for axes below (by
-# trial with the verdict on a machine, 8 inches for 9.6)
+_LEAST = 640.0  # least width of a PNG in pixels: sharp in one column on a screen with two per CSS pixel (by trial)
+_LARGE = 6.0  # width in inches above which a figure scrolls on a telephone, as its letters would be too small
+# Smallest factor by which a figure is narrowed: its letters keep their size, and leave no room for axes below it (by
+# trial with the verdict on a machine, 8 inches for 9.6).
+_LEAST_SCALE = 0.83
 _SVG_STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "steadyslip",
@@ -30,7 +31,7 @@ _SVG_STYLE: Any = {
 
 
 def column_html(make: Callable[[], Any], words: str) -> str:
-    """HTML of a figure one journal column wide, of which two stand beside each other on paper; as `figure_html`."""
+    """HTML by `figure_html` of a figure one journal column wide, so that two fit side by side on paper."""
     with rc_context(JOURNAL):
         return figure_html(make, words)
 
@@ -45,7 +46,7 @@ def figure_html(make: Callable[[], Any], words: str, width: float | None = None)
     words : str
         Text alternative for screen readers.
     width : float, optional
-        Width of the figure in inches, or at least `_LEAST_SCALE` of its own; the height is scaled with it.
+        Width of the figure in inches, but at least `_LEAST_SCALE` of its own; the height is scaled with it.
     """
     known = set(plt.get_fignums())
     with rc_context(_SVG_STYLE):
@@ -72,7 +73,7 @@ def figure_html(make: Callable[[], Any], words: str, width: float | None = None)
 
 
 def _png_base64(found: Any) -> str:
-    """Base64 text of a figure as PNG with a palette of 48 colours, 100 dots per inch and `_LEAST` across or more."""
+    """Base64 text of a figure as PNG: 48 colours, at least 100 dots per inch and `_LEAST` pixels wide."""
     from PIL import Image
 
     many, few = io.BytesIO(), io.BytesIO()
@@ -82,7 +83,7 @@ def _png_base64(found: Any) -> str:
 
 
 def _shorter(path: str) -> str:
-    """Path of an SVG in hundredths of a point, without the spaces that it can do without."""
+    """SVG path rounded to hundredths of a point, without optional spaces."""
     rounded = re.sub(r"-?\d+\.\d+", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), path)
     return re.sub(r"(?<=[A-Za-z])\s+|\s+(?=[A-Za-z])", "", rounded.strip())
 

@@ -21,9 +21,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
 _RANGE_FACTOR = 1e2  # default range of stiffness: two decades to each side of its centre
-_VIEW_FACTOR = (
-    3.0  # half the width of the view over the largest |s| of the eigenvalues that decide stability (by trial)
-)
+_VIEW_FACTOR = 3.0  # half width of the view over the largest |s| of the eigenvalues that decide stability (by trial)
 _FAST_RATIO = 1e3  # decaying eigenvalues with |s| above this times the lowest |s| are left out of view (by trial)
 
 
@@ -35,14 +33,14 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     rig : Slider
     ax : matplotlib.axes.Axes, optional
     stiffness : array_like, optional
-        Stiffnesses k > 0 (Pa/m); by default four decades around the critical one, or the rig's own. Gains kp where
-        the gain of a controller is all the stiffness that the rig has.
+        Stiffnesses k > 0 (Pa/m); by default four decades around the critical one, or the rig's own. Gains kp if the
+        rig has no spring but a controller gain.
 
     Returns
     -------
     matplotlib.axes.Axes
         Real and imaginary parts in 1/s and rad/s; colour is k or kp. Diamonds: edges of the stable set; circles:
-        the rig's own eigenvalues, those outside the view in words. The view is set by the eigenvalues that
+        the rig's own eigenvalues, those outside the view listed in the legend. The view is set by the eigenvalues that
         decide stability; fast ones may lie outside.
 
     Raises
@@ -50,7 +48,7 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     NoSteadySliding
         If the rig has no steady sliding to perturb.
     NotAvailable
-        If there is neither a critical nor an own stiffness to start from; pass `stiffness`.
+        If the rig has neither a stiffness nor a critical one, so that no default exists; pass `stiffness`.
 
     Examples
     --------
@@ -121,15 +119,13 @@ def _stiffnesses(rig: Slider, along: str, own: float, ends: Any, given: Any) -> 
 
 
 def _crossings(rig: Slider, along: str, ends: Any, k: Any) -> tuple[list[float], list[Any]]:
-    """Ends of the stable intervals within the range `k` (Pa/m), and the eigenvalues on the imaginary axis at each."""
+    """Ends of the stable intervals within the range of `k` (Pa/m); the eigenvalues on the imaginary axis at each."""
     edges, crossings = [], []
     for edge in np.unique(ends[(ends >= k[0]) & (ends <= k[-1])]):
         found = eigenvalues(rig, {along: edge})
         found = found[np.isfinite(found)]
         nearest = found[np.argmin(np.abs(found.real))]
-        if (
-            abs(nearest.real) > 1e-6 * np.abs(found).max()
-        ):  # no root near the axis: at the limit of well-posedness it crosses at infinity
+        if abs(nearest.real) > 1e-6 * np.abs(found).max():  # limit of well-posedness: a root crosses at infinity
             continue
         edges.append(float(edge))
         crossings.append(np.unique([nearest, nearest.conjugate()]))
@@ -139,7 +135,7 @@ def _crossings(rig: Slider, along: str, ends: Any, k: Any) -> tuple[list[float],
 def _set_view(ax: Axes, roots: Any, own_roots: Any, crossings: list[Any]) -> None:
     """Set axis limits that include the origin, the crossings of the imaginary axis and the slowest eigenvalue.
 
-    Without a crossing, include all growing eigenvalues, and those with a size within `_FAST_RATIO` of the lowest.
+    Without a crossing they include all growing eigenvalues and those with |s| within `_FAST_RATIO` of the smallest.
     """
     own = np.abs(own_roots)
     if crossings:
@@ -153,7 +149,7 @@ def _set_view(ax: Axes, roots: Any, own_roots: Any, crossings: list[Any]) -> Non
 
 
 def _own_label(ax: Axes, own_roots: Any) -> str:
-    """Legend text of the rig's own eigenvalues, with the values of those out of view."""
+    """Legend text for the rig's own eigenvalues, which lists those outside the view."""
     (left, right), top = ax.get_xlim(), ax.get_ylim()[1]
     outside = own_roots[(own_roots.real < left) | (own_roots.real > right) | (np.abs(own_roots.imag) > top)]
     if not outside.size:

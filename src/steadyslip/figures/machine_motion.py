@@ -1,4 +1,4 @@
-"""Figures of simulated motion of machines: contact histories and friction force against slip rate."""
+"""Figures of simulated motion of machines: histories of contacts, and friction force against slip rate."""
 
 from __future__ import annotations
 
@@ -31,20 +31,22 @@ if TYPE_CHECKING:
     from steadyslip.motion import History
 
 _CONTACTS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)  # line colours, in the order of the contacts
-MAX_SHADED_EVENTS = 40  # slip events are shaded if they are fewer: more would run into each other (by trial)
+MAX_SHADED_EVENTS = 40  # slip events are shaded only if fewer than this: more would merge (by trial)
 MIN_BAND_SHARE = 4e-3  # least width of a shaded slip event, as share of the time axis: about two pixels
-_MIN_SPAN = 1e-3  # least span of an axis over the largest value, so that rounding is not enlarged (by trial)
-_PRESSED = 0.1  # share of the largest normal force from which on friction sets its axis where contact is lost: below,
-# a ratio of two forces that vanish grows without bound, and presses all else into a line
+_MIN_SPAN = 1e-3  # least span of an axis over the largest value, so that rounding is not magnified (by trial)
+# In runs that lose contact, share of the largest normal force below which friction does not set its axis: a ratio of
+# two vanishing forces grows without bound, and would press all else into a line.
+_PRESSED = 0.1
 _LOG_RATIO = 3.0  # highest over lowest slip rate above which the axis is logarithmic (by trial)
 _MIN_STEADY_RATIO = 1e-3  # least slip rate of the line of steady states over the highest of the run
 _SHADE = 0.4  # opacity of shading: 10 steps of lightness L* (of 100) from white, and curves stay in sight (by trial)
-LEAVES = 1e4  # slip rate over the steady one beyond which a run that ends early is not drawn: what the model leaves
-# out, such as mass, decides there
+# Slip rate over the steady one beyond which a run that ends early is not drawn: there effects decide that the model
+# leaves out, such as mass.
+LEAVES = 1e4
 
 
 def history(run: History, panels: np.ndarray) -> np.ndarray:
-    """Plot slip rate, friction and, if there is a third panel, normal force of every contact; shade slip events."""
+    """Plot slip rate, friction and, if a third panel is given, normal force of every contact; shade slip events."""
     names = list(run.rig.contacts)
     colors = {name: _CONTACTS[i % len(_CONTACTS)] for i, name in enumerate(names)}
     factor, unit = display_unit("s", float(run.end) or 1.0)
@@ -77,7 +79,7 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
 def phase_plane(
     run: History, rig: Machine, ax: Axes | None, label: str, color: str, contact: str | None
 ) -> Axes:  # fmt: skip
-    """Plot friction force against slip rate at a contact, with the line of steady states and a dot at the last one.
+    """Plot friction force against slip rate at a contact, with the line of steady states, and a dot at that of the end.
 
     The slip-rate axis is logarithmic if slip rates are positive and span more than a factor of three.
     """
@@ -98,7 +100,7 @@ def phase_plane(
         return ax
     if logarithmic:
         ax.set_xscale("log")
-        if high < 100 * low:  # less than two decades: numbers instead of powers of ten
+        if high < 100 * low:  # less than two decades: label ticks with plain numbers
             plain_log_ticks(ax.xaxis)
     if abs(high - low) < _MIN_SPAN * max(abs(high), abs(low)):
         ax.set_xlim(*sorted((0.9 * low, 1.1 * high)))  # otherwise rounding would fill the panel
@@ -124,9 +126,9 @@ def phase_plane(
 
 
 def limit_friction(run: History, ax: Axes, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
-    """Fit the axis of friction to samples that press, in a run that ends because contact is lost.
+    """Limit the friction axis of a run that loses contact to samples with more than `_PRESSED` of the largest load.
 
-    `pairs` are friction and normal force, or normal stress, of every contact.
+    `pairs` are friction and normal force (or stress), each (n,), of every contact.
     """
     kept = np.concatenate([own[(load >= _PRESSED * np.max(load)) & np.isfinite(own)] for own, load in pairs])
     if run.status == "contact lost" and len(kept) and np.ptp(kept):
@@ -140,12 +142,12 @@ def steady_rate(rig: Any, name: str) -> float:
 
 
 def leaves(run: History, rates: np.ndarray, steady: float) -> np.ndarray:
-    """Mask of the samples of a run that ends early at which it is too fast to be drawn."""
+    """Mask of the samples not drawn: in a run that ends early those above `LEAVES` times the `steady` rate (m/s)."""
     return np.asarray((run.status != "done") & (np.abs(rates) > LEAVES * abs(steady)))
 
 
 def end_title(run: History, left: np.ndarray) -> str:
-    """Title of a run that ended early: how, at which contact and when, and what is left out of the figure."""
+    """Title of a run that ended early: how, where, when, and the limit of the drawing if samples are `left` out."""
     how = "simulated" if run.status == "too many steps" else run.status
     where = f" ({run.contact})" if run.contact else ""
     limit = f",\ndrawn up to {LEAVES:.0f} times the steady velocity" if np.any(left) else ""
@@ -154,7 +156,7 @@ def end_title(run: History, left: np.ndarray) -> str:
 
 
 def mark_end(run: History, ax: Axes, x: np.ndarray, y: np.ndarray, left: np.ndarray) -> None:
-    """Mark the last point that is drawn of a run that ended early, and say in the legend how and when it ended."""
+    """Mark the last drawn point of a run that ended early; the legend has how and when it ended."""
     drawn = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     if run.status != "done" and len(drawn):
         at = x[drawn[-1:]], y[drawn[-1:]]
@@ -162,12 +164,12 @@ def mark_end(run: History, ax: Axes, x: np.ndarray, y: np.ndarray, left: np.ndar
 
 
 def shading(color: str) -> dict[str, Any]:
-    """Style of the shading of slip events: an outline tells it from a grid in grey, where a pale colour is white."""
+    """Style of shaded slip events; with an outline, since pale shading may not differ from the background in grey."""
     return {"facecolor": to_rgba(color, _SHADE), "edgecolor": to_rgba(color, 1.0), "linewidth": 0.6}
 
 
 def _most_varying_contact(run: History, rig: Machine) -> str:
-    """Name of the contact whose arcsinh(slip rate / steady slip rate) spans most; the first of equals."""
+    """Name of the contact whose arcsinh(slip rate / steady slip rate) has the largest range; of ties the first."""
 
     def span(name: str) -> float:
         steady = steady_contact_at(rig, name, np.array([rig.drive.velocity]))["slip_rate"][0]
@@ -178,7 +180,7 @@ def _most_varying_contact(run: History, rig: Machine) -> str:
 
 
 def _limit_zoom(panel: Axes, size: float) -> None:
-    """Keep a linear y axis at least `_MIN_SPAN` times `size` high, so that rounding is not enlarged; no tick offset."""
+    """Keep a linear y axis at least `_MIN_SPAN` times `size` high, so that rounding stays small; no tick offset."""
     if panel.get_yscale() != "linear":
         return
     panel.ticklabel_format(axis="y", useOffset=False)
@@ -189,7 +191,7 @@ def _limit_zoom(panel: Axes, size: float) -> None:
 
 
 def shade_let_go(run: History, panels: np.ndarray, factor: float) -> None:
-    """Shade the times at which the load point is let go and moves freely; `factor` is the unit of time in s."""
+    """Shade the times at which the load point is released and moves freely; `factor` is the unit of time in s."""
     if "creep" not in run.data or not len(run["t"]):
         return
     free = np.concatenate([[False], run["creep"] > 0, [False]])

@@ -22,9 +22,9 @@ from steadyslip.machine.mechanism import NORMAL
 from steadyslip.verdict import Analysis
 from steadyslip.verdict.words import PACE, format_parameter
 
-_SPAN_FACTOR = 100.0  # ranges are drawn from value / 100 to value x 100
+_SPAN_FACTOR = 100.0  # ranges are drawn from value / 100 to value × 100
 LOST = ("lock-up", "lift-off", "no solution")
-"""Kinds of edges beyond which sliding is not steady."""
+"""Kinds of edges beyond which no steady sliding exists."""
 _MAX_PARAMETERS = 24  # rows of `stable_ranges`, so that the figure fits on a page (by trial)
 
 
@@ -34,7 +34,7 @@ def machine_verdict(found: Analysis) -> np.ndarray:
     Returns
     -------
     ndarray of matplotlib.axes.Axes
-        Axes of `stable_ranges`, `mode_shape` and `eigenvalue_plane`; the first alone without steady sliding.
+        Axes of `stable_ranges`, `mode_shape` and `eigenvalue_plane`; only the first without a mode.
 
     Examples
     --------
@@ -63,10 +63,10 @@ def machine_verdict(found: Analysis) -> np.ndarray:
 
 
 def stable_ranges(found: Analysis, ax: Axes | None = None) -> Axes:
-    """Plot the stable range of each parameter, the others held, as a bar over the parameter divided by its own value.
+    """Plot the stable range of each parameter, the others unchanged, as a bar over the parameter divided by its value.
 
-    Only positive parameters with an edge within a factor of 100 are drawn, nearest edge first; beside each is
-    the value at that edge.
+    Only positive parameters with an edge within a factor of 100 are drawn, nearest edge first; the value at that edge
+    is printed beside the bar.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def _drawn_margins(found: Analysis) -> list[Margin]:
 
 
 def undrawn_edges(found: Analysis) -> list[str]:
-    """Names of parameters with an edge that `stable_ranges` does not draw: too far away, too many, or not positive."""
+    """Names of parameters with an edge that `stable_ranges` leaves out: too far away, too many, or not positive."""
     drawn = {one.parameter for one in _drawn_margins(found)}
     return [one.parameter for one in found.margins if one.edge is not None and one.parameter not in drawn]
 
@@ -134,7 +134,7 @@ def _label_rows(ax: Axes, labels: list[str]) -> None:
 
 
 def _pieces(margin: Margin) -> list[tuple[float, float, int]]:
-    """Intervals (low, high) of a parameter with at least one edge, SI units, and the status in each."""
+    """Intervals between the edges of a parameter: low and high end (SI units), and status code."""
     edges = sorted(margin.edges, key=lambda edge: edge.value)
     ends = [0.0, *(edge.value for edge in edges), math.inf]
     stable = [edges[0].stable == "below", *(edge.stable == "above" for edge in edges)]
@@ -149,10 +149,10 @@ def _pieces(margin: Margin) -> list[tuple[float, float, int]]:
 def mode_shape(found: Analysis | Modes, ax: Axes | None = None) -> Axes:
     """Plot the amplitude of every body in a mode, and the largest shares of its energy.
 
-    It is the leading mode of an analysis, and the chosen one of `steadyslip.modes`.
+    For an analysis the leading mode, for `steadyslip.modes` the chosen one. Blue bars: amplitudes over the largest one,
 
-    Blue bars: amplitudes over the largest one, each relative to the rigid motion of the machine; bars of bodies in
-    opposite phase point to the left. Orange bars: shares of energy.
+    each relative to the rigid motion of the machine; bars of bodies in opposite phase point to the left. Orange bars:
+    shares of energy.
 
     Raises
     ------
@@ -201,12 +201,12 @@ def mode_shape(found: Analysis | Modes, ax: Axes | None = None) -> Axes:
 
 
 def eigenvalue_plane(found: Analysis, ax: Axes | None = None) -> Axes:
-    """Plot eigenvalues in the complex plane, on axes that are logarithmic beyond the smallest part and linear within.
+    """Plot eigenvalues in the complex plane; axes are linear up to the smallest part, and logarithmic beyond.
 
     Raises
     ------
     NotAvailable
-        If there are none.
+        If there are no eigenvalues.
 
     Examples
     --------
@@ -243,7 +243,7 @@ def eigenvalue_plane(found: Analysis, ax: Axes | None = None) -> Axes:
 
 
 def _few_ticks(axis: Any, low: float, high: float, least: float) -> None:
-    """Set ticks at zero and at up to two powers of ten to each side, none below `least`; no minor ticks."""
+    """Set ticks at zero and at up to two powers of ten on each side, none below `least`; no minor ticks."""
     ticks = [0.0]
     for end in (low, high):
         top = math.floor(math.log10(abs(end)))

@@ -1,4 +1,4 @@
-"""Sketch of a machine in Matplotlib; `steadyslip.machine.drawing` decides what is drawn where."""
+"""Sketch of a machine in Matplotlib; the layout is that of `steadyslip.machine.drawing`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from steadyslip.machine.machine import Machine
 COLORS = {INK: BLACK, PALE: "#777777", DRIVEN: BLUE, FORCED: VERMILION}
 BODY_COLOUR = "#DDE3EA"
 LARGE, SMALL = 9.0, 7.5  # font sizes in points
-_INCHES_PER_UNIT = 0.66  # inches of the figure for one unit of the sketch: texts of 7.5 points just fit (by trial)
+_INCHES_PER_UNIT = 0.66  # inches per unit of the sketch: texts of 7.5 points just fit (by trial)
 
 
 def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:
@@ -28,7 +28,7 @@ def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:
     ----------
     machine : Machine
     ax : matplotlib.axes.Axes, optional
-        Its limits are set, and its frame is taken away.
+        Its limits are set and its frame is removed.
 
     Returns
     -------

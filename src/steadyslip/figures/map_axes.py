@@ -31,12 +31,12 @@ from steadyslip.figures.style import add_legend_above, axis_label, display_unit,
 from steadyslip.maps.view.cut import FAILING, View
 from steadyslip.maps.view.map_result import MapResult
 
-LOG_RATIO = 100.0  # highest over lowest value from which on a scale is logarithmic: two decades
+LOG_RATIO = 100.0  # ratio of highest to lowest value from which a scale is logarithmic: two decades
 WORD_COLOURS = {
     "stable": STABLE, "settles": STABLE, "unstable": UNSTABLE, "hunts": UNSTABLE, "blow-up": BLOW_UP,
     "runs away": BLOW_UP,
 }  # fmt: skip
-"""Of kinds that have their own colour."""
+"""Colours of kinds that have their own colour, by word."""
 KIND_COLOURS = (GREY, SKY, ORANGE, BLACK, BLUE, VERMILION, GREEN, PURPLE, YELLOW)
 
 
@@ -51,7 +51,7 @@ def short_name(name: str) -> str:
 
 
 def parameter_words(found: MapResult, name: str) -> str:
-    """Words and letter of a parameter of a map's rig; `short_name` of others, such as times of a protocol."""
+    """Label of a parameter of a map: words and letter if it is of the rig, else `short_name` (times of a protocol)."""
     with suppress(NotAvailable):
         if name in found.rig.parameters():
             return stress_name(parameter_label(found.rig, name), found.area(name))
@@ -65,7 +65,7 @@ def result_label(found: MapResult, name: str) -> str:
 
 
 def drawn_result(found: MapResult, view: View, show: str | None) -> str | None:
-    """Name of the result to draw besides the regions of stability; None if only those are drawn."""
+    """Name of the result to draw over the regions of stability; None if only those are drawn."""
     if show is not None:
         return None if show == "status" else show
     if "status" not in view.values:
@@ -83,7 +83,7 @@ def is_geometric(values: Array) -> bool:
 
 
 def missing_note(view: View, name: str) -> str:
-    """Label text: share of samples without a value of a result, and their treatment; empty if all samples have one."""
+    """Label text on the share of samples without a value of a result, and their treatment; empty if all have one."""
     share = float(np.max(view.missing.get(name, np.zeros(1)), initial=0.0))
     if share == 0:
         return ""
@@ -132,7 +132,7 @@ def add_legend(ax: Axes) -> None:
 
 
 def add_legend_entry(ax: Axes, handle: Any) -> None:
-    """Add an entry to the legend for a patch or line that is not visible in the Axes."""
+    """Add a legend entry for a patch or line without drawing it in the Axes."""
     if isinstance(handle, Patch):
         ax.fill_between([], [], facecolor=handle.get_facecolor(), edgecolor=handle.get_edgecolor(),
                         hatch=handle.get_hatch(), label=handle.get_label())  # fmt: skip

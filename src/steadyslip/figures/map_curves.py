@@ -1,4 +1,4 @@
-"""Figures of maps: results over one parameter as curves, random samples as points."""
+"""Figures of maps over one parameter as curves, and of random samples as points."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
     values = np.asarray(view.values[name])[order]
     unit = found.unit(name)
     finite = values[np.isfinite(values)]
-    if name in view.bands:  # zeros stand for failures: leave them out of the scale
+    if name in view.bands:  # zeros mark failed samples: they do not set the scale
         finite = view.bands[name][np.isfinite(view.bands[name]) & (view.bands[name] != 0)]
     scale = Scale(name, unit, finite if len(finite) else np.ones(1), spaced=False, area=found.area(name))
     if values.ndim == 3:  # ends of stable intervals: (points, intervals, 2)

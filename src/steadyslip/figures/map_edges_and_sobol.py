@@ -1,4 +1,4 @@
-"""Figures of refined edges of maps and of Sobol indices."""
+"""Figures of the refined edges of maps, and of Sobol indices."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from steadyslip.maps.view.cut import View, own_value
 
 
 def refined(found: Refined, ax: Axes | None = None) -> Axes:
-    """Plot the points added along an edge of a map over two grids, and the edge found with them.
+    """Plot the points added along an edge of a map over two grids, and the edge found from them.
 
-    Further parameters, given as lists, are held at the value nearest to that of the rig.
+    Further parameters, given as lists, are held at the value nearest to the rig's own.
 
     Parameters
     ----------

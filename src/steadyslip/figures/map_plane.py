@@ -1,4 +1,4 @@
-"""Figures of maps over two parameters: regions or colours, contours, edge of stability, the base rig."""
+"""Figures of maps over two parameters: regions or colours, contours, edge of stability, mark of the base rig."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ from steadyslip.maps.view.map_result import MapResult
 from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import operating_point
 
-_POWERS, _SUPERSCRIPTS = 4, str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")  # 0.001 and 1000 are easy to read
-_ROOM = 0.03  # of an axis beyond its end, so that a mark there is whole: a little more than half of it
-_CLOSER, _MOST = 8, 101  # times as many points as a map for contours; most along an axis, where a map has fewer
-_FINE = 8  # times as many points as a map has, for words in its areas
+_POWERS, _SUPERSCRIPTS = 4, str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")  # 0.001 to 1000 are printed as plain numbers
+_ROOM = 0.03  # share of an axis added beyond its end so that a mark there is drawn whole: over half its size
+_CLOSER, _MOST = 8, 101  # refinement of a map's grid for contours; most points along an axis
+_FINE = 8  # refinement of a map's grid for placing words in areas
 
 
 def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) -> None:
-    """Plot a result over two parameters: regions with contours, or colours; panels may share a colour `scale`."""
+    """Plot a result over two parameters: stability regions with contours, or colours on a `scale` shared by panels."""
     scales = label_axes(ax, found, view)
     x, y = (s(p) for s, p in zip(scales, view.places, strict=True))
     name = drawn_result(found, view, show)
@@ -79,7 +79,7 @@ def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: 
 
 
 def _limits(values: Array, scale: Scale, own: float | None) -> tuple[float, float]:
-    """Ends of the axis of a map: its least and largest value, with room beyond one at which the mark of the rig stands.
+    """Limits of an axis of a map: its least and largest value, widened where the mark of the rig lies at an end.
 
     `values` are in the unit of the axis, `own` is the rig's value in SI units.
     """
@@ -99,7 +99,7 @@ def _limits(values: Array, scale: Scale, own: float | None) -> tuple[float, floa
 def _areas(ax: Axes, found: MapResult, view: View, refined: _Refined) -> Path | None:
     """Fill the area of each status, its outline refined between the points of the map.
 
-    Return the outline of steady sliding in the units of the axes; None if there is none in the map.
+    Return the outline of steady sliding in the units of the axes; None if the whole map slides steadily.
     """
     status = view.values["status"]
     absent = ~np.isin(status, SLIDING)
@@ -120,7 +120,7 @@ def _areas(ax: Axes, found: MapResult, view: View, refined: _Refined) -> Path | 
 
 
 def _words(ax: Axes, status: Array, refined: _Refined, lines: Sequence[Array]) -> None:
-    """Write the word of each status into its area if there is room; the legend needs no entry for it then."""
+    """Write the word of each status into its area if it fits, and drop its legend entry then."""
     fine = np.repeat(np.repeat(status, _FINE, axis=0), _FINE, axis=1)
     for code, (words, _) in AREAS.items():
         if (fine == code).any() and write_inside(ax, fine == code, words, refined.place, lines):
@@ -145,14 +145,14 @@ def _edge(ax: Axes, status: Array, refined: _Refined, within: Path | None) -> li
 
 
 def _pieces(line: Array) -> list[Array]:
-    """Pieces of a line of points (n, 2) that NaN separates."""
+    """Pieces of a line of points (n, 2), split at NaN."""
     whole = np.isfinite(line[:, 0])
     cuts = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(int)))
     return [line[a:b] for a, b in cuts.reshape(-1, 2)]
 
 
 class _Refined:
-    """Statuses between the points of a map, from its rig; without a rig or of samples those of the nearest points."""
+    """Evaluates status between the points of a map from its rig, or if there is none from the nearest points."""
 
     def __init__(self, found: MapResult, view: View, scales: Sequence[Scale]) -> None:
         self.view, self.scales = view, scales
@@ -162,7 +162,7 @@ class _Refined:
             self.rig = None if any(name.startswith("protocol.") for name in names) else found.rig
 
     def _values(self, shares: Any, which: int) -> Any:
-        """SI values of a parameter at fractions of its axis, whose grid points are at equal distances."""
+        """SI values of a parameter at fractions of its axis, on which grid points are equally spaced."""
         places = self.view.places[which]
         log = self.scales[which].log
         at = np.interp(np.asarray(shares) * (len(places) - 1), range(len(places)), np.log(places) if log else places)
@@ -178,9 +178,9 @@ class _Refined:
         return self.scales[0](self._values(shares[:, 0], 0)), self.scales[1](self._values(shares[:, 1], 1))
 
     def finer(self, name: str, along: str | None, values: Array) -> tuple[Array, Array, Array, Array]:
-        """Units of both axes, statuses and values of a result, at `_CLOSER` times the points of a map, for contours.
+        """Data for contours on a grid `_CLOSER` times finer: x (m,), y (n,) axis units; status, result (n, m).
 
-        Those of the map itself for results that are not computed here, and where there is no rig or it takes long.
+        For results that cannot be recomputed quickly, or without a rig, those of the map itself.
         """
         status = self.view.values["status"]
         sizes = [min(_CLOSER * (n - 1) + 1, max(n, _MOST)) for n in status.shape[::-1]]
@@ -196,13 +196,13 @@ class _Refined:
         return x, y, status, np.where(np.isin(status, SLIDING) & (status != UNDAMPED), rate, np.nan)
 
     def outline(self, mask: Array, *codes: int, known: Any = True) -> Path:
-        """Outline, in the units of the axes, of the region of these statuses; `mask` has them on the grid."""
+        """Outline, in units of the axes, of the region with one of the status `codes`; `mask` has it on the grid."""
         if min(mask.shape) < 2 or not len(path := regions.region_path(self.has(*codes), mask, known)):
             return Path(np.empty((0, 2)))
         return Path(np.column_stack(self.place(path.vertices)), path.codes)
 
     def has(self, *codes: int) -> regions.Predicate:
-        """Predicate of the fractions of both axes: whether a rig has one of these statuses."""
+        """Predicate of fractions of both axes: True where the status is one of `codes`."""
 
         def predicate(a: Any, b: Any) -> Any:
             if self.rig is not None:
@@ -217,7 +217,7 @@ class _Refined:
 
 
 def _absence_reasons(found: MapResult, view: View, absent: Array) -> str:
-    """Reasons for no steady sliding in brackets (lock-up, lift-off), from some of the points; empty if unknown."""
+    """Text of reasons for no steady sliding in brackets (lock-up, lift-off), from some points; empty if unknown."""
     try:
         rig = found.rig
     except NotAvailable:
@@ -241,7 +241,7 @@ def _contours(
     """Draw contours of a result and return their lines; `around` has the outline of steady sliding and the edges."""
     view = plane.view
     values = np.where(view.values["status"] == UNDAMPED, np.nan, view.values[name])
-    good = values[np.isfinite(values)]  # of an undamped rig a growth rate is rounding
+    good = values[np.isfinite(values)]  # the growth rate of an undamped rig is only rounding
     if min(values.shape) < 2 or not len(good) or good.min() == good.max():
         return []
     x, y, status, values = plane.finer(name, found.along(name), values)
@@ -265,7 +265,7 @@ def _contours(
 
 
 def _level_words(level: float) -> str:
-    """Number of a contour, powers of ten far from 1 as such."""
+    """Text of a contour level; powers of ten far from 1 are written as 10ⁿ."""
     power = round(math.log10(abs(level))) if level else 0
     if abs(power) < _POWERS or not math.isclose(abs(level), 10.0**power):
         return f"{level:g}".replace("-", "−")
@@ -330,7 +330,7 @@ def colour_scale(fields: Sequence[Array], unit: str, area: float | None) -> tupl
 
 
 def _edge_of_shares(ax: Axes, x: Array, y: Array, share: Array) -> list[Array]:
-    """Draw where half of the samples are stable; return its pieces as vertices (n, 2) in the units of the axes."""
+    """Draw the line where half of the samples are stable; return its pieces, (n, 2) in the units of the axes."""
     if min(share.shape) < 2 or not np.nanmin(share) < 0.5 < np.nanmax(share):
         return []
     lines = ax.contour(x, y, share, levels=[0.5], colors=BLACK, linewidths=2)
@@ -341,10 +341,10 @@ def _edge_of_shares(ax: Axes, x: Array, y: Array, share: Array) -> list[Array]:
 def _mark_own(
     ax: Axes, found: MapResult, view: View, scales: Sequence[Scale], pieces: Sequence[Array], with_values: bool
 ) -> None:
-    """Mark the base rig, if in view, and the point of the edge nearest to it, with its values if `with_values`."""
+    """Mark the base rig, if in view, and the nearest point of the edge, with its values if `with_values`."""
     own = [own_value(found, name) for name in view.names]
     if not all(_is_own(found, name, value) for name, value in view.held.items()):
-        return  # it is in another panel, or in none
+        return  # the rig belongs to another panel, or to none
     limits = [ax.get_xlim(), ax.get_ylim()]
     if any(value is None for value in own):
         return
@@ -368,7 +368,7 @@ def _mark_own(
 
 
 def _is_own(found: MapResult, name: str, value: float) -> bool:
-    """True if a value of a parameter that is held is the one of the map's values that stands for the rig's own."""
+    """True if `value`, at which a parameter is held, is the value of the map nearest to the rig's own."""
     own, values = own_value(found, name), np.asarray(found.dataset[name].values)
     return own is None or (values.min() <= own <= values.max() and value == values[np.argmin(np.abs(values - own))])
 

@@ -33,10 +33,10 @@ def map_figure(
 ) -> Any:
     """Draw a map.
 
-    Over two parameters: regions that are stable, unstable and without steady sliding, with contours of the result
-    shown; or colours, where it is not about steady sliding. Over one: the result as a curve, with these regions shaded.
-    Samples are drawn as median and 95 % band, or as share that is stable; samples without grids as points. The base rig
-    is marked, and the point of the edge of stability that is nearest to it in the figure.
+    Over two parameters: stable regions, unstable ones and those without steady sliding, with contours of the result; or
+    colours, if the result is not about steady sliding. Over one parameter: the result as a curve, with these regions
+    shaded. Samples on grids are drawn as median and 95 % band, or as share that is stable; without grids as points. The
+    base rig is marked, and the point of the edge of stability nearest to it in the figure.
 
     Parameters
     ----------
@@ -45,13 +45,13 @@ def map_figure(
         Parameters on the axes; the first two of the map unless given. For a map of two or more dimensions, give
         ``y=""`` to draw curves over `x` alone.
     show : str, optional
-        Result; unless given, regions with contours of the safety factor or growth rate where the map has them.
+        Result to draw; by default regions with contours of the safety factor or growth rate if the map has them.
     facet : str, optional
-        A third parameter: one picture for each of up to six of its values.
+        A third parameter: one panel for each of up to six of its values.
     at : mapping of str to float or str, optional
-        Where to hold other parameters; at the value nearest to the rig's own unless given.
+        Values at which other parameters are held; by default those nearest to the rig's own.
     ax : matplotlib.axes.Axes, optional
-        Not with `facet`.
+        Not allowed with `facet`.
 
     Returns
     -------
@@ -132,14 +132,14 @@ def _draw_facets(found: MapResult, names: Sequence[str], show: str | None, third
 
 
 def _common_scale(found: MapResult, views: Sequence[View], name: str | None) -> Any:
-    """Colour scale common to panels side by side; an empty tuple where there are no colours to scale."""
+    """Colour scale common to all panels; an empty tuple if nothing is drawn in colours of a scale."""
     if name is None or len(views[0].names) < 2 or found.words(name):
         return ()
     return colour_scale([view.values[name] for view in views], found.unit(name), found.area(name))
 
 
 def _draw(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any = None) -> None:
-    """Plot points, curves or a plane, as the view needs; `scale` is a colour scale shared by panels."""
+    """Plot samples as points, a curve or a plane, depending on the view; `scale` is a colour scale shared by panels."""
     if view.scattered:
         draw_scatter(ax, found, view, show)
     elif len(view.names) == 1:

@@ -21,22 +21,22 @@ from steadyslip.figures.style import (
 from steadyslip.linear import ModeChart
 
 _GROWING, _OTHERS = (VERMILION, ORANGE, PURPLE), (BLUE, GREEN, SKY)
-_ROOM = 0.1  # share of the height above and below the oscillations that are coloured
-_DECADES = 20.0  # ratio of frequencies from which their axis is logarithmic
-_DEEP = 3.0  # times the largest growth, or least decay, up to which damping is drawn if anything is that close to zero
+_ROOM = 0.1  # free height above and below the coloured oscillations, as share of their range
+_DECADES = 20.0  # ratio of highest to lowest frequency from which the axis is logarithmic
+_DEEP = 3.0  # largest damping ratio drawn, over the largest growth or least decay
 
 
 def mode_chart(found: ModeChart, ax: Any = None) -> Any:
-    """Plot frequencies and damping ratios over the parameter: where two modes meet, damping of one falls below zero.
+    """Plot frequencies and damping ratios of modes over a parameter.
 
-    Coloured are the eight oscillations that are damped least, in warm colours those that grow somewhere; the line is
-    thick where they do. Grey: others. Dashed: edges of stability. Dotted: the machine as it is.
+    The eight least damped oscillations are coloured, in warm colours those that grow somewhere, with thick lines where
+    they grow. Grey: others. Dashed: edges of stability. Dotted: the machine's own value.
 
     Parameters
     ----------
     found : ModeChart
     ax : sequence of matplotlib.axes.Axes, optional
-        Two: for frequencies and for damping ratios.
+        Two, for frequencies and for damping ratios.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def mode_chart(found: ModeChart, ax: Any = None) -> Any:
     Raises
     ------
     ParameterError
-        If other Axes than two are given.
+        If `ax` is not two Axes.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def mode_chart(found: ModeChart, ax: Any = None) -> Any:
 
 
 def _name_marks(axes: Any) -> None:
-    """Name in the legend what is drawn of the marks: where a mode grows, an edge, this machine, other modes."""
+    """Add legend entries for the marks that are drawn: growing modes, edges, this machine, other modes."""
     marks = {
         "_grows": ("grows", {"color": BLACK, "linewidth": 3.2}),
         "_edge": ("edge of stability", {"color": BLACK, "linestyle": "--", "linewidth": 1}),
@@ -119,7 +119,7 @@ def _name_marks(axes: Any) -> None:
 
 
 def _set_heights(axes: Any, frequencies: np.ndarray, ratios: np.ndarray) -> None:
-    """Set the ranges of both vertical axes so that the oscillations that are coloured are seen, and zero damping."""
+    """Set the ranges of both y axes so that the coloured oscillations and zero damping are in view."""
     low, high = float(np.nanmin(frequencies)), float(np.nanmax(frequencies))
     if high > _DECADES * low:
         axes[0].set_yscale("log")

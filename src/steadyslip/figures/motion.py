@@ -40,15 +40,15 @@ from steadyslip.protocol.protocol import NORMAL_STRESS
 if TYPE_CHECKING:
     from steadyslip.motion import History
 
-_ROUNDING = 1e-6  # change of a normal force that is none, share of it: that of steps of integration, with room
-_MIN_SPAN = 2e-3  # least span of an axis over the largest value, so that rounding is not enlarged (by trial)
-_STEADY_POINTS = 161  # of the line of steady states: a bend of one decade is smooth in a figure 160 mm wide
+_ROUNDING = 1e-6  # relative change of a normal force that counts as constant: above errors of integration
+_MIN_SPAN = 2e-3  # least span of an axis over the largest value, so that rounding is not magnified (by trial)
+_STEADY_POINTS = 161  # points of the line of steady states: a bend of one decade is smooth in a figure 160 mm wide
 
 
 def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
-    """Plot velocity, friction and normal stress over time in three panels; for machines, of every contact.
+    """Plot velocity, friction and normal stress over time in three panels; for machines for every contact.
 
-    A normal stress that is constant has no panel of its own: its value stands above that of friction.
+    A constant normal stress has no panel: its value is the title of the friction panel.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     Returns
     -------
     ndarray of matplotlib.axes.Axes
-        Two or three; those that were given.
+        Two or three; `ax` itself if given.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
 
 
 def _constant_load(run: History) -> str:
-    """Words with the normal stress or force of every contact; empty if one of them changes by more than rounding."""
+    """Text with the constant normal stress or force of every contact; empty if one of them changes."""
     rig = run.rig
     many = {name: run[f"{name}.normal_force"] for name in rig.contacts} or {"": run["normal_stress"]}
     if not all(len(one) and np.ptp(one) <= _ROUNDING * np.max(np.abs(one)) for one in many.values()):
@@ -127,7 +127,7 @@ def _constant_load(run: History) -> str:
 
 
 def _limit_zoom(ax: Axes, *shown: np.ndarray) -> None:
-    """Keep the y axis at least `_MIN_SPAN` times the largest value high (rounding is not enlarged); no tick offset."""
+    """Keep the y axis at least `_MIN_SPAN` times the largest value high (rounding is not magnified); no tick offset."""
     values = np.concatenate([values[np.isfinite(values)] for values in shown])
     if ax.get_yscale() == "linear":
         ax.ticklabel_format(axis="y", useOffset=False)
@@ -153,7 +153,7 @@ def _add_slip_legend(ax: Axes, count: int) -> None:
 def _velocity_panel(run: History, v: np.ndarray, ax: Axes, time: np.ndarray) -> None:
     """Plot block and load-point velocity, on a logarithmic axis if the block never rests or reverses.
 
-    Velocities `v` (m/s) of the block are NaN where they are not drawn.
+    Velocities `v` (m/s, (n,)) of the block are NaN where they are not to be drawn; `time` is in the unit of the axis.
     """
     load, moves = run["load_velocity"], bool(np.all(run["v"] > 0))
     reference = "steady sliding" if Protocol.of(run.protocol).frees_load_point else "load point"
@@ -186,16 +186,17 @@ def phase_plane(
 
     For machines: friction force against slip rate at one contact.
 
-    Arrows show the direction of motion. Runs drawn on the same Axes share the line of steady states of the first, which
-    is that at the normal stress of the rig, without what a protocol adds; v0 is the velocity of the rig's drive.
+    Arrows show the direction of motion. Runs drawn on the same Axes share the line of steady states of the first run.
+    It is computed at the normal stress of the rig, without changes by a protocol; v0 is the velocity of the rig's
+    drive.
 
     Parameters
     ----------
     run : History
-        One that never rests or reverses; points where it does are left out.
+        Motion; points at which the block rests or reverses are left out.
     ax : matplotlib.axes.Axes, optional
     label : str, optional
-        For a legend.
+        Label of the run in the legend.
     color : str, optional
     contact : str, optional
         For machines: name of the contact; by default the one whose slip rate changes most.
@@ -240,7 +241,7 @@ def phase_plane(
 
 
 def _puller(rig: Slider) -> str:
-    """What pulls the block: spring, drive (a controller), or both."""
+    """Text for what pulls the block: ``spring``, ``drive`` (a controller), or both."""
     held = rig.stiffness or rig.axial_stiffness
     if not rig.drive.proportional():
         return "spring"
@@ -253,11 +254,11 @@ def _steady_spring_stress(rig: Slider, velocity: float) -> float:
 
 
 def _draw_steady_states(run: History, rig: Slider, ax: Axes, x: np.ndarray, factor: float) -> None:
-    """Plot spring stress (Pa / factor) of steady sliding over drive velocity, with a dot at the last of the run."""
+    """Plot spring stress (Pa / `factor`) of steady sliding over ln(v/v0), with a dot at the last drive velocity."""
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
     margin = 0.1 * (high - low) + 0.05
     steps = np.linspace(low - margin, high + margin, _STEADY_POINTS)
-    bottom, top = ax.get_ylim()  # of the motion, which is not to shrink beside its steady states
+    bottom, top = ax.get_ylim()  # range of the motion: steady states far outside are not drawn
     beside = bottom - 0.5 * (top - bottom), top + 0.5 * (top - bottom)
     stress = []
     for u in steps:

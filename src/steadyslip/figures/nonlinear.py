@@ -44,25 +44,25 @@ _ENDS: dict[str, dict[str, Any]] = {
     "edge": {"marker": "o", "markerfacecolor": "white"},
     "not followed": {"marker": "+", "markersize": 9, "markeredgewidth": 1.5},
 }
-"""Marks of ends of a branch, by kind."""
+"""Marker styles of the ends of a branch, by kind of end."""
 _STEADY: dict[str, dict[str, Any]] = {
     "steady sliding": {"color": BLACK, "linewidth": 0.8, "linestyle": ":"},
     "steady sliding, stable": {"color": BLACK, "linewidth": 1.4, "linestyle": "-"},
     "steady sliding, unstable": {"color": BLACK, "linewidth": 0.8, "linestyle": "--"},
 }
-"""Lines of steady sliding, by whether it is stable; dotted where that is not known."""
+"""Line styles of steady sliding: stable, unstable, and dotted where that is not known."""
 _UNDECIDED_HATCHES = ("++", "oo", "..")
-NARROW_RANGE = 1e-3  # relative range of a branch below which its axis is the distance from the onset (by trial)
-BEYOND = 1.5  # factor beyond the onset up to which steady sliding is drawn, or tenths of the branch (by trial)
-LEGEND_WIDTH = 36  # characters of a line of a legend in two columns
+NARROW_RANGE = 1e-3  # relative range of a branch below which the axis shows the distance from the onset (by trial)
+BEYOND = 1.5  # steady sliding is drawn beyond the onset by this factor, or by so many tenths of the branch (by trial)
+LEGEND_WIDTH = 36  # characters per line of a legend with two columns
 
 
 def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     """Plot a bifurcation diagram: peak and lowest velocity of the cycles against the parameter.
 
-    Full lines are stable cycles, dashed ones unstable; a dotted line is steady sliding. Doubled branches are thin.
-    Diamonds are the cycles of the rig itself, filled if they attract. All ends are marked: with a bar at the end of the
-    range, a cross where no cycle could be followed any further, a ring at another edge, a plus where none was followed.
+    Full lines are stable cycles, dashed ones unstable; black lines are steady sliding. Period-doubled branches are
+    thin. Diamonds are the cycles of the rig itself, filled if they attract. Marks of ends: bar, end of the range;
+    cross, no cycle could be followed further; ring, another edge; plus, a branch that was not followed.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     area, origin, along = branch.rig.printed_area(branch.along), 0.0, parameter_label(branch.rig, branch.along)
     factor, unit = display_unit(branch.unit, branch.onset.value, area)
     reach = max((abs(one.value - branch.onset.value) for one in branch.cycles), default=0.0)
-    if 0 < reach < NARROW_RANGE * abs(branch.onset.value):  # all ticks of an axis of values would read alike
+    if 0 < reach < NARROW_RANGE * abs(branch.onset.value):  # tick labels of values would all look alike
         origin = branch.onset.value
         factor, unit = display_unit(branch.unit, reach, area)
         along = f"{along} less {format_quantity(origin, branch.unit, 6, area)}"
@@ -130,7 +130,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
 
 
 def _steady_stretches(branch: CycleBranch) -> list[tuple[np.ndarray, str]]:
-    """Values of the parameter along the branch and a little beyond its onset, in stretches of equal stability."""
+    """Parameter values along the branch and beyond its onset, in pieces of equal stability, each with its label."""
     values = np.unique([branch.onset.value, *(one.value for one in branch.cycles)])
     low, high = values[0], values[-1]
     if low == high:
@@ -161,8 +161,8 @@ def _draw_velocities(
 ) -> None:
     """Plot peak and lowest velocity along a branch, a line for each piece of equal stability.
 
-    Velocities of 0 or below, of a block that stops or turns round, are left out: the axis is logarithmic. `axis` is the
-    origin and unit of the parameter (SI), `speed` the unit of velocity (m/s).
+    Velocities ≤ 0 (the block stops or reverses) are left out, as the axis is logarithmic. `axis` is the origin and unit
+    of the parameter (SI), `speed` the unit of velocity (m/s).
     """
     used: set[bool] = set()
     for stretch in branch.stretches:
@@ -178,9 +178,9 @@ def _draw_velocities(
 
 
 def _draw_ends(branch: CycleBranch, ax: Axes, axis: tuple[float, float], speed: float, steady_speed: float) -> None:
-    """Mark both velocities where parts of the branch and of doubled ones end, by the kind of end, with the reason.
+    """Mark peak and lowest velocity at the ends of the branch and of the doubled one, by kind of end, with the reason.
 
-    `axis` and `speed` are those of `_draw_velocities`, `steady_speed` (m/s) that of sliding at the onset.
+    `axis` and `speed` as in `_draw_velocities`; `steady_speed` (m/s) is the velocity of steady sliding at the onset.
     """
     marked: list[tuple[str, str, float, Cycle | None]] = []
     for part in filter(None, (branch, branch.doubled)):
@@ -258,10 +258,10 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
 
 
 def basin(found: Basin, ax: Axes | None = None) -> Axes:
-    """Plot the outcome of motion from every starting point: velocity over slip ahead of the load point.
+    """Plot the outcome of motion from every starting point, over slip ahead of the load point and velocity.
 
     Pale blue: motion returns to steady sliding (the dot). Yellow: undecided, with the reason in the legend. Dashed
-    lines: unstable cycles. Words stand in areas that have room for them; full lines are their edges.
+    lines: unstable cycles. Full lines separate areas, which are named where the word fits.
 
     Parameters
     ----------
@@ -316,9 +316,9 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
 def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     """Plot thresholds over two parameters, from `steadyslip.threshold_map` with DataArrays.
 
-    Areas without a threshold look as in a stability chart: orange where steady sliding is unstable, hatched where there
-    is none. Crossed: the threshold is undecided, with the reason in the legend. White: no kick in the range is large
-    enough.
+    Areas without a threshold are drawn as in a stability chart: orange where steady sliding is unstable, hatched where
+    there is none. Crossed: the threshold is undecided, with the reason in the legend. White: no kick in the range is
+    large enough.
 
     Parameters
     ----------
@@ -378,12 +378,12 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
 
 
 def _fill_cells(ax: Axes, x: Any, y: Any, where: Any, color: Any, **style: Any) -> None:
-    """Fill the cells around the points of a grid where a mask is true."""
+    """Fill the cells of a grid around the points where the mask `where` is True."""
     ax.pcolor(x, y, np.where(where, 1.0, np.nan), cmap=color, shading="nearest", **style)
 
 
 def _missing_regions(found: Any) -> list[tuple[str, Any, str]]:
-    """Legend text, mask and hatch for each reason for which thresholds are missing."""
+    """Legend text, mask and hatch of each reason for missing thresholds."""
     missing = np.isnan(found.values)
     limit = np.asarray(found["limit"].values) if "limit" in found.coords else np.full(missing.shape, "not known")
     doubts = cycle(_UNDECIDED_HATCHES)

@@ -19,7 +19,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.units import deg
 
-ANGLES = tuple(degrees * deg for degrees in (-45, -30, 0, 30, 45))  # those of the paper
+ANGLES = tuple(degrees * deg for degrees in (-45, -30, 0, 30, 45))  # rad, as in the paper
 _MAX_MASS = 1e6  # highest m* searched: a limit above it counts as none
 _MIN_MASS = 1e-12  # lowest m* searched: stands for a quasistatic rig
 _CROSSING_TOLERANCE = 1e-6  # largest relative spread of the curves of all angles that counts as one crossing point
@@ -31,16 +31,17 @@ def critical_stiffness_against_mass(
 ) -> Axes:
     """Dimensionless critical stiffness against dimensionless mass, one curve for each spring angle.
 
-    The paper's Fig. 7, by the general route and for any friction with a slip distance. Steady sliding is
-    stable above a curve. Circle: m*_cr1, where the angle makes no difference (eq. 30); dotted lines: m*_cr2,
-    from which on no stiffness is stable (eq. 31).
+    The paper's Fig. 7, computed from the general equations, for any friction with a slip distance. Steady sliding is
+    stable above a curve. Circle: m*_cr1, at which the angle has no effect (eq. 30); dotted lines: m*_cr2, above which
+    no stiffness is stable (eq. 31).
 
     Parameters
     ----------
     rig : Slider
-        With an inclined spring; its own angle and mass do not matter.
+        Rig with an inclined spring; its own angle and mass are not used.
     angles : sequence of float, optional
-        Spring angles (rad); −45, −30, 0, 30, 45 degrees by default. Locked-up ones appear in the legend only.
+        Spring angles (rad); −45, −30, 0, 30, 45 degrees by default. Angles at which the rig locks up are in the legend
+        only.
     m_star : array_like, optional
         Dimensionless masses m* = m v0²/(σss d_c), positive.
     ax : matplotlib.axes.Axes, optional
@@ -136,8 +137,8 @@ def _lock_up_note(rig: Slider) -> str:
 def dimensionless_critical_stiffness(rig: Slider, angles: Any, m_star: Any) -> Any:
     """κ_cr = k_cr d_c/σss at spring angles (rad) and dimensionless masses m* = m v0²/(σss d_c), which broadcast.
 
-    NaN where no stiffness is an edge, and for angles past lock-up. σss depends on the angle where the rig
-    gives its preload, so the same m* is another mass at every angle.
+    NaN without a critical stiffness, and for angles past lock-up. If the rig has a preload, σss depends on the angle,
+    so that one m* is a different mass at each angle.
 
     Raises
     ------
@@ -151,22 +152,22 @@ def dimensionless_critical_stiffness(rig: Slider, angles: Any, m_star: Any) -> A
 
 
 def mass_at(rig: Slider, angles: Any, m_star: Any) -> Any:
-    """m (kg/m²) of dimensionless masses m* at spring angles (rad), which broadcast; NaN past lock-up."""
+    """Masses (kg/m²) for dimensionless masses m* at spring angles (rad), which broadcast; NaN past lock-up."""
     return m_star * _steady_stress(rig, angles) * slip_distance(rig) / rig.drive.velocity**2
 
 
 def is_locked(rig: Slider, angles: Any) -> Any:
-    """True where a spring at these angles (rad) leaves no steady sliding."""
+    """Mask of spring angles (rad) at which no steady sliding exists (lock-up)."""
     return np.isnan(_steady_stress(rig, angles))
 
 
 def _steady_stress(rig: Slider, angles: Any) -> Any:
-    # broadcast because a rig that gives σss itself has one value for all angles short of lock-up
+    # broadcast: a rig with a given σss has one value for all angles short of lock-up
     return np.broadcast_to(operating_point(rig, {"contact.angle": angles}).sigma, np.shape(angles))
 
 
 def slip_distance(rig: Slider) -> float:
-    """d_c (m) of an inclined-spring rig, of the first state where friction has several."""
+    """Slip distance d_c (m) of a rig with an inclined spring; that of the first state if friction has several."""
     if not isinstance(rig.contact, InclinedSpring):
         raise NotAvailable(
             f"the contact is {rig.contact.name!r}, which has no spring angle to vary; allowed: inclined-spring"
@@ -177,9 +178,9 @@ def slip_distance(rig: Slider) -> float:
 
 
 def mass_of_equal_stiffness(rig: Slider, angles: Iterable[float]) -> float:
-    """m*_cr1: the mass at which κ_cr is the same at all these angles (rad); NaN if there is none.
+    """Dimensionless mass m*_cr1 at which κ_cr is equal at all `angles` (rad); NaN if there is none.
 
-    Angles past lock-up do not count. Found as a crossing of the general curves; the paper's eq. 30 is a check.
+    Angles past lock-up are ignored. Found as the crossing of the general curves, independently of the paper's eq. 30.
     """
     from scipy.optimize import brentq
 
@@ -205,9 +206,9 @@ def mass_of_equal_stiffness(rig: Slider, angles: Iterable[float]) -> float:
 
 
 def mass_of_no_stiffness(rig: Slider, angle: float) -> float:
-    """m*_cr2: the mass from which on no stiffness is stable at this angle (rad); NaN if there is none.
+    """Dimensionless mass m*_cr2 above which no stiffness is stable at an angle (rad); NaN if there is none.
 
-    The mass at which the critical stiffness ceases to exist, narrowed to rounding; eq. 31 is a check.
+    Found as the mass at which the critical stiffness ceases to exist, independently of the paper's eq. 31.
     """
 
     def exists(m_star: Any) -> Any:

@@ -1,7 +1,7 @@
-"""Outlines of the region of a plane in which a predicate is true.
+"""Outlines of the regions of a plane in which a predicate is true.
 
-A grid finds the regions; every outline point is then moved along its grid line to where the predicate
-changes, by bisection, so that the outline is exact and not a staircase.
+Regions are found on a grid; each outline point is then moved along its grid line, by bisection, to where the
+predicate changes, so that the outline is exact instead of a staircase.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from contourpy import FillType, LineType, contour_generator
 from matplotlib.path import Path
 
 Predicate = Callable[[Any, Any], Any]  # fractions of the two axes, 0 to 1, to bool
-_HALVINGS = 40  # bisection of one grid spacing to 1e-12 of it
+_HALVINGS = 40  # bisections of a grid spacing: to 1e-12 of it
 
 
 def region_path(predicate: Predicate, mask: Any, known: Any = True) -> Path:
     """Outline of the region where the predicate is true, in fractions of the axes; empty path if there is none.
 
-    `mask` has its values on a grid over the axes, shape (rows, columns), or others where they are not `known`.
+    `mask`, shape (rows, columns), has values of the predicate on a grid over the axes, any others where not `known`.
     """
     generator = contour_generator(z=mask.astype(float), name="serial", fill_type=FillType.OuterOffset)
     vertices, codes = [np.empty((0, 2))], [np.empty(0, np.uint8)]
@@ -36,8 +36,7 @@ def region_path(predicate: Predicate, mask: Any, known: Any = True) -> Path:
 def edges(predicate: Predicate, mask: Any, left_out: Any = False, known: Any = True) -> Any:
     """Lines along which the predicate changes, shape (n, 2) in fractions of the axes, NaN between lines.
 
-    `mask` has its values on a grid, or others where they are not `known`; grid cells with a corner where `left_out` is
-    true are left out.
+    `mask` as in `region_path`; grid cells with a corner where `left_out` is True are skipped.
     """
     z = np.ma.masked_array(mask.astype(float), np.array(np.broadcast_to(left_out, mask.shape)))
     generator = contour_generator(z=z, name="serial", line_type=LineType.Separate, corner_mask=False)
@@ -49,9 +48,9 @@ def edges(predicate: Predicate, mask: Any, left_out: Any = False, known: Any = T
 
 
 def carried(grid: Any, missing: Any) -> tuple[Any, Any]:
-    """Grid with the nearest known value where it is missing, and where that is further than one grid point away.
+    """Grid with missing values replaced by the nearest known ones, and mask of those more than a grid point from any.
 
-    Regions and lines drawn from it reach below the region where values are missing, without a gap at its outline.
+    Regions and lines drawn from it extend beneath the region of missing values, so that no gap shows at its outline.
     """
     from scipy.ndimage import binary_erosion, distance_transform_edt
 
@@ -62,15 +61,15 @@ def carried(grid: Any, missing: Any) -> tuple[Any, Any]:
 
 
 def on_grid(function: Predicate, points: int) -> Any:
-    """Values of a function of the fractions of both axes on a grid of so many points along each."""
+    """Values of a function of fractions of both axes on a grid, shape (points, points)."""
     share = np.linspace(0, 1, points)
     return np.asarray(function(*np.meshgrid(share, share)))
 
 
 def widest_place(mask: Any, size: tuple[float, float]) -> tuple[float, float, float]:
-    """Point of a region around which an ellipse is largest, in fractions of the axes, and its size over `size`.
+    """Centre of the largest ellipse inside a region, in fractions of the axes, and its size over `size`.
 
-    `size` is half the width and half the height of the ellipse, in fractions of the axes.
+    `size` is half the width and half the height of an ellipse, in fractions of the axes.
     """
     from scipy.ndimage import distance_transform_edt
 
@@ -82,9 +81,9 @@ def widest_place(mask: Any, size: tuple[float, float]) -> tuple[float, float, fl
 
 
 def _bisected(outline: Any, mask: Any, predicate: Predicate, known: Any) -> Any:
-    """Outline with each point halfway between two grid points moved to where the predicate changes, by bisection.
+    """Outline (n, 2) with each point between two grid points moved to where the predicate changes, by bisection.
 
-    Points between two whose values are not `known` stay halfway.
+    Points between two grid points that are not `known` stay halfway.
     """
     last = np.array(mask.shape)[::-1] - 1
     low, high = np.floor(outline).astype(int), np.ceil(outline).astype(int)

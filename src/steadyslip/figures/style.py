@@ -52,27 +52,27 @@ OWN_RIG: dict[str, Any] = {
 }  # fmt: skip -- style of the marker at the values of the rig itself
 
 
-WIDTH = 6.4  # inches, of a figure that is not for a journal: Matplotlib's own default
+WIDTH = 6.4  # inches, width of a figure that is not for a journal: Matplotlib's default
 JOURNAL: Any = {
     "figure.figsize": (85 / 25.4, 64 / 25.4), "font.size": 7.8, "axes.labelsize": 7, "axes.titlesize": 7,
     "xtick.labelsize": 7, "ytick.labelsize": 7, "legend.fontsize": 6.5, "legend.frameon": False,
     "legend.handlelength": 2.6, "lines.linewidth": 1.0, "lines.markersize": 3.5, "axes.linewidth": 0.6,
     "xtick.major.width": 0.6, "ytick.major.width": 0.6, "hatch.linewidth": 0.5,
 }  # fmt: skip
-"""Settings of Matplotlib for a figure as wide as one column of a journal: 85 mm, letters of 7 points.
+"""Matplotlib settings for a figure as wide as one column of a journal: 85 mm, letters of 7 points.
 
-Words of size "small", .83 of the first, have 6.5 points: 9.5 pixels on a telephone 390 wide.
+Words of size "small" have 6.5 points (0.83 of "font.size"): 9.5 pixels on a telephone 390 pixels wide.
 """
-_SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "path"}  # fonts are in the file
+_SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "path"}  # fonts are embedded
 _TITLE_GAP = 4.0  # points between a legend and the title above it
-_LEGEND_LETTERS = 42  # of a line beside its mark: .5 of 6.5 points each, in the 60 mm of Axes 85 mm wide with a scale
-_SMALLEST = 0.6  # share of their size to which words of areas are shrunk: to 4 points at 85 mm, the least that is read
-AREA_WORD = "word of an area"  # group of texts that name areas
-_FEW_DECADES = 5  # of a logarithmic axis that are all numbered
+_LEGEND_LETTERS = 42  # most letters of a legend line: 0.5 of 6.5 points each, in 60 mm of Axes in a figure of 85 mm
+_SMALLEST = 0.6  # smallest factor by which words in areas are shrunk: 4 points at 85 mm, the least legible
+AREA_WORD = "word of an area"  # gid of Matplotlib texts that name areas
+_FEW_DECADES = 5  # most decades of a logarithmic axis that are all numbered
 _OF_UNIT = re.compile(r"(?<=\d) (?=[^\W\d])")  # space between a number and its unit
-_FOOTER = 6.0  # points, size of the letters below a saved figure
+_FOOTER = 6.0  # points, letter size of the footer of a saved figure
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=2.5, foreground="white", alpha=0.8)]
-"""Outline of words that stand on an area."""
+"""Outline of words written on an area."""
 SAFETY_WORDS = "stiffness over critical $k/k_{\\mathrm{cr}}$"
 """Name of the safety factor for a legend."""
 CONTOURS: dict[str, Any] = {"colors": BLACK, "linewidths": 0.6}
@@ -81,7 +81,7 @@ EDGES: dict[str, dict[str, Any]] = {
     "drift": {"color": BLACK, "linewidth": 2, "linestyle": (0, (5, 1.5, 1, 1.5))},
     "no steady sliding": {"color": BLACK, "linewidth": 1.5, "linestyle": (0, (3, 2))},
 }
-"""Lines of edges by what begins beyond them: an oscillation, a growth without one, no steady sliding."""
+"""Line styles of edges by what begins beyond: a growing oscillation, growth without oscillation, no steady sliding."""
 AREAS: dict[int, tuple[str, dict[str, Any]]] = {
     STABLE_CODE: ("stable", {"facecolor": STABLE, "linewidth": 0}),
     UNSTABLE_CODE: ("unstable", {"facecolor": UNSTABLE, "linewidth": 0}),
@@ -89,7 +89,7 @@ AREAS: dict[int, tuple[str, dict[str, Any]]] = {
     ABSENT_CODE: ("no steady sliding", {"facecolor": "white", "edgecolor": GREY, "hatch": "///", "linewidth": 0}),
     UNKNOWN_CODE: (OUT_OF_RANGE, {"facecolor": "white", "edgecolor": GREY, "hatch": "xx", "linewidth": 0}),
 }
-"""Words and style of the area of each status."""
+"""Word and style of the area of each status code."""
 
 
 def axes_or_new(ax: Axes | None, height: float = 4.8) -> Axes:
@@ -103,7 +103,7 @@ def axes_or_new(ax: Axes | None, height: float = 4.8) -> Axes:
 
 
 def is_narrow() -> bool:
-    """True where new figures are as narrow as a column of a journal, so that panels stand one below the other."""
+    """True if new figures are as narrow as a column of a journal, so that panels are stacked vertically."""
     return bool(rcParams["figure.figsize"][0] < WIDTH)
 
 
@@ -121,7 +121,7 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], **options: An
 
 
 def given_panels(ax: Any, shape: tuple[int, ...], allowed: str) -> np.ndarray:
-    """Axes given by the user as an array; ParameterError, with `allowed`, if they do not have the given shape."""
+    """Axes given by the user as an array; raises ParameterError, with the text `allowed`, unless of the given shape."""
     given = np.asarray(ax, dtype=object)
     if given.shape != shape:
         raise ParameterError([Problem("ax", f"got Axes of shape {given.shape}; allowed: {allowed}")])
@@ -129,7 +129,7 @@ def given_panels(ax: Any, shape: tuple[int, ...], allowed: str) -> np.ndarray:
 
 
 def unmanaged_axes(width: float = 6.4, height: float = 4.8) -> Axes:
-    """Axes of a new figure that is not registered with pyplot, so that nobody has to close it; size in inches."""
+    """Axes of a new figure that is not registered with pyplot and need not be closed; size in inches."""
     axes: Axes = Figure(figsize=(width, height), layout="constrained").subplots()
     return axes
 
@@ -163,13 +163,13 @@ def journal() -> Iterator[None]:
 
 
 def save_with_footer(axes: Any, path: str, result: Any) -> None:
-    """Save the figure of Axes with rig, values that no axis has, version and date below it, and its fonts inside."""
+    """Save the figure of Axes with embedded fonts and a footer: file, values not on an axis, version and date."""
     figure = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
     width, height = figure.get_size_inches()
     file, told = _footer(result, figure.axes)
-    most = int(width * 72 / (0.55 * _FOOTER))  # letters: .55 of their size wide
+    most = int(width * 72 / (0.55 * _FOOTER))  # letters per line: each 0.55 of its size wide
     words = fill(f"{file}{told}", most, break_long_words=False, break_on_hyphens=False)
-    text = _plain(file) + with_subscripts(words[len(file) :])  # a_b in a file's name is no letter with a subscript
+    text = _plain(file) + with_subscripts(words[len(file) :])  # a_b in a file's name is no subscript
     extra = (1 + text.count("\n")) * 1.3 * _FOOTER / 72 + 0.06  # inches
     figure.set_size_inches(width, height + extra)
     if engine := figure.get_layout_engine():
@@ -181,9 +181,9 @@ def save_with_footer(axes: Any, path: str, result: Any) -> None:
 
 
 def _keep_inside(ax: Axes) -> None:
-    """Move words of areas into the frame of axes that are smaller than those they were placed for; shrink longer ones.
+    """Move words in areas into the frame, if the axes have become smaller since they were placed; shrink longer ones.
 
-    Words that would be smaller than a share of `_SMALLEST` are left out: the legend has them.
+    Words that would shrink to less than `_SMALLEST` of their size are hidden: the legend has them.
     """
     frame = ax.get_window_extent()
     ends = np.array([[frame.x0, frame.y0], [frame.x1, frame.y1]])
@@ -200,9 +200,9 @@ def _keep_inside(ax: Axes) -> None:
 
 
 def _number_decades(axis: Axis) -> None:
-    """Number every decade of an upright logarithmic axis of two to few decades, which low axes would pass over.
+    """Number every decade of a logarithmic y axis of 2 to `_FEW_DECADES` decades; low axes would skip some.
 
-    Shorter ones have numbers within their decades, by `plain_log_ticks`.
+    Shorter axes have numbers within their decades, by `plain_log_ticks`.
     """
     low, high = sorted(axis.get_view_interval())
     if axis.get_scale() == "log" and 0 < 100 * low <= high <= low * 10**_FEW_DECADES:
@@ -210,7 +210,7 @@ def _number_decades(axis: Axis) -> None:
 
 
 def fit_words(figure: Any) -> None:
-    """Part ticks whose numbers touch, put powers of ten into units, and units of vertical axes below too long names."""
+    """Thin out touching tick labels, move powers of ten into units, and break y labels that are too long."""
     figure.draw_without_rendering()
     for axis in (one for ax in figure.axes for one in (ax.xaxis, ax.yaxis)):
         _put_power_in_unit(axis)
@@ -230,7 +230,7 @@ def fit_words(figure: Any) -> None:
 
 
 def _put_power_in_unit(axis: Axis) -> None:
-    """Write the power of ten beside an axis into the unit of its label: a bare 1e4 does not say of what it is."""
+    """Move the power of ten from the end of an axis into the unit of its label, where its meaning is clear."""
     power = re.fullmatch(r"1e([-−]?\d+)", axis.get_offset_text().get_text())
     name, bracket, counted = axis.get_label_text().rpartition(" (")
     if power and bracket and axis.get_visible():
@@ -240,7 +240,7 @@ def _put_power_in_unit(axis: Axis) -> None:
 
 
 def _parts_ticks(figure: Any, bins: int) -> bool:
-    """Leave at most so many intervals on horizontal axes whose numbers touch; True if there are any such axes."""
+    """Reduce x axes with touching tick labels to `bins` intervals at most; True if there were any."""
     found = False
     for ax in figure.axes:
         boxes = [one.get_window_extent() for one in ax.get_xticklabels() if one.get_text()]
@@ -248,7 +248,7 @@ def _parts_ticks(figure: Any, bins: int) -> bool:
         if touching and isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
             ax.locator_params(axis="x", nbins=bins)
             found = True
-        elif touching and isinstance(ax.xaxis.get_major_locator(), FixedLocator):  # ticks that were set: every other
+        elif touching and isinstance(ax.xaxis.get_major_locator(), FixedLocator):  # explicit ticks: keep every other
             ax.set_xticks(ax.get_xticks()[::2], [one.get_text() for one in ax.get_xticklabels()[::2]])
             found = True
     return found
@@ -262,8 +262,8 @@ def plain_log_ticks(axis: Axis) -> None:
 
 
 def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
-    """File of a result, and its law, values with letters (fitted, held, first) and protocol, the program, the date."""
-    fit = getattr(result, "fit", result)  # of draws
+    """File name of a result; footer text with law, values (fitted, held, at first), protocol, version and date."""
+    fit = getattr(result, "fit", result)  # draws have their fit
     plan = getattr(fit, "plan", None)
     rig = fit.rig() if hasattr(plan, "records") else getattr(result, "rig", None)
     parts, file = [], ""
@@ -272,7 +272,7 @@ def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
         fitted = {name.partition("@")[0] for name in estimates}
         labels = [text for ax in axes for text in (ax.get_xlabel(), ax.get_ylabel())]
         shown = [name for name in rig.parameters() if _on_an_axis(rig, name, labels)]
-        protocol = getattr(getattr(result, "run", result), "protocol", None)  # its own, or that of its run
+        protocol = getattr(getattr(result, "run", result), "protocol", None)  # of the result, or of its run
         changed = changed_by(rig, protocol) if isinstance(protocol, Protocol) else []
         held = ", ".join(_values_of(rig, [one for one in rig.parameters() if one not in {*fitted, *shown, *changed}]))
         first = ", ".join(_values_of(rig, changed))
@@ -282,7 +282,7 @@ def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
         )
         laws = [one.friction for one in rig.laws_by_contact().values()] if fitted else []
         words = dict.fromkeys(f"{law.name} friction{_kind(law)}" for law in laws)
-        file = rig.read_from or getattr(getattr(result, "path", None), "name", "")  # that of a map
+        file = rig.read_from or getattr(getattr(result, "path", None), "name", "")  # maps have a path
         parts = [*words, f"fitted: {told}" if told else "", f"held: {held}" if held else ""]
         done = _OF_UNIT.sub("\xa0", typeset(done))
         parts += [f"at first: {first}" if first else "", f"protocol: {done}" if done else ""]
@@ -292,7 +292,7 @@ def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
 
 
 def _values_of(rig: Rig, names: Iterable[str]) -> Iterator[str]:
-    """Values of some parameters of a rig with words and letters, in no-break spaces; none of those that are zero."""
+    """Text of name, letter and value of the parameters `names` that are not zero, with no-break spaces."""
     for name in names:
         one = rig.parameters()[name]
         if one.value and np.ndim(one.value) == 0:
@@ -306,13 +306,13 @@ def _unbroken(text: str) -> str:
 
 
 def _kind(law: Any) -> str:
-    """Names of the parts of a law, such as its evolution, in brackets; empty if it has none."""
+    """Names of the parts of a law, such as its evolution law, in brackets; empty if it has no parts."""
     names = ", ".join(one.name for one in records_in(law) if getattr(one, "name", "none") != "none")
     return f" ({names})" if names else ""
 
 
 def _on_an_axis(rig: Rig, name: str, labels: Sequence[str]) -> bool:
-    """True if an axis has a parameter, so that a figure shows more than one value of it."""
+    """True if a parameter is on one of the axes, whose labels are `labels`."""
     words = stress_name(parameter_label(rig, name), rig.printed_area(name))
     return any(label.startswith(f"{words} (") for label in labels)
 
@@ -320,7 +320,7 @@ def _on_an_axis(rig: Rig, name: str, labels: Sequence[str]) -> bool:
 def display_unit(si_unit: str, typical: float, area: float | None = None) -> tuple[float, str]:
     """Display unit for values of a typical size: its size in SI units, and its name.
 
-    With an `area` (m²), quantities per unit area are shown as totals: a stress (Pa) divided by the size is a force (N).
+    With an `area` (m²), quantities per unit area are displayed as totals: a stress (Pa) over the size is a force (N).
 
     >>> display_unit("Pa/m", 9e9), display_unit("rad", 0.1)[1]
     ((1000000000.0, 'GPa/m'), 'deg')
@@ -335,13 +335,13 @@ def add_legend_above(
 ) -> None:
     """Add a legend above the axes, where it covers no data; `height` leaves room for the power of ten of the y axis.
 
-    It has at most so many columns as fit. Labels that begin as one in `without` are left out.
+    It has up to `columns` columns, as many as fit. Labels that begin with a text in `without` are left out.
     """
     handles, labels = ax.get_legend_handles_labels()
     if is_narrow():
         labels = [label if len(label) <= _LEGEND_LETTERS or "$" in label else _wrapped(label) for label in labels]
     kept = [(one, label) for one, label in zip(handles, labels, strict=True) if not label.startswith(tuple(without))]
-    for many in range(columns, 0, -1):  # as many columns as are no wider than the axes
+    for many in range(columns, 0, -1):  # reduce until no wider than the axes
         legend = ax.legend(
             *zip(*kept, strict=True),
             loc="lower left",
@@ -356,7 +356,7 @@ def add_legend_above(
 
 
 def add_title_above_legend(ax: Axes, title: str, color: str) -> None:
-    """Add a title to axes that have a legend above, clear of it."""
+    """Add a title to axes, above the legend that is above them."""
     legend = ax.get_legend()
     top = legend.get_window_extent().y1 - ax.get_window_extent().y1 if legend is not None else 0.0
     pad = max(top, 0.0) * 72 / ax.figure.dpi + _TITLE_GAP
@@ -385,12 +385,12 @@ def add_arrowheads(ax: Axes, x: Any, y: Any, color: str) -> None:
 
 
 def axis_label(name: str, unit_name: str) -> str:
-    """Axis label: name and unit, 1 for plain numbers."""
+    """Axis label: name and unit in brackets, (1) for dimensionless numbers."""
     return f"{name} ({unit_name or '1'})"
 
 
 def parameter_label(rig: Rig, name: str) -> str:
-    """Words and letter of a parameter for an axis, its subscript set below the line; the dotted name if it has neither.
+    """Words and letter of a parameter for an axis, with subscripts as mathematics; the dotted name if it has neither.
 
     >>> from steadyslip.reproduce import paper_rig
     >>> parameter_label(paper_rig(), "contact.angle"), parameter_label(paper_rig(), "friction.d_c")
@@ -406,10 +406,10 @@ def _subscript(base: str, below: str) -> str:
 
 
 def with_subscripts(text: str) -> str:
-    """Text for Matplotlib with letters such as d_c set as mathematics, dollar signs as they are."""
+    """Text for Matplotlib with letters such as d_c set as mathematics, dollar signs printed literally."""
     return re.sub(r"(?<![^\W_])(\w)_(\w+)", lambda found: _subscript(found[1], found[2]), _plain(text))
 
 
 def _plain(text: str) -> str:
-    """Text for Matplotlib in which dollar signs are no mathematics."""
+    """Text for Matplotlib with dollar signs escaped, so that they do not begin mathematics."""
     return text.replace("$", r"\$")

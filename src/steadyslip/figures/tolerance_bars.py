@@ -14,12 +14,12 @@ from steadyslip.verdict.tolerances import Tolerated
 from steadyslip.verdict.words import format_parameter_range
 
 COLOURS = {True: STABLE, False: UNSTABLE, None: UNKNOWN}
-_DECADE = 10.0  # ratio of safety factors from which their axis is logarithmic: how far from 1 is a ratio on both sides
+_DECADE = 10.0  # ratio of safety factors from which their axis is logarithmic
 WORDS = {True: "stable throughout", False: "unstable throughout", None: "stable in a part"}
 
 
 def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
-    """Plot the range of stiffness over critical stiffness, or of the growth rate, within tolerances.
+    """Plot ranges of the safety factor (stiffness over critical stiffness), or of the growth rate, within tolerances.
 
     One bar for each parameter varied alone, one for all together. Growth rates are drawn if `found.along` is empty.
 

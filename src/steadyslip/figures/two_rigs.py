@@ -1,4 +1,4 @@
-"""Figure of two compared rigs: k/k_cr or growth of both over what differs most, or over the speed."""
+"""Figure of two compared rigs: k/k_cr or growth rate of both, over the parameter that differs most or the speed."""
 
 from __future__ import annotations
 
@@ -34,11 +34,10 @@ _CURVES: Any = (
 
 
 def two_rigs(found: RigComparison, ax: Axes | None = None) -> Axes:
-    """Plot how near the edge of stability two compared rigs are, over what differs between them.
+    """Plot the distance of two compared rigs from the edge of stability, over a parameter in which they differ.
 
-    The abscissa is that of `abscissa`. A mark
-    on each curve is the rig itself. The ordinate is k/k_cr where that tells the verdict everywhere, else the growth
-    rate.
+    The parameter is that with the largest part in the change of the verdict. A mark on each curve is the rig itself.
+    The ordinate is k/k_cr if k/k_cr > 1 means stable everywhere, else the growth rate.
 
     Parameters
     ----------
@@ -77,9 +76,9 @@ def two_rigs(found: RigComparison, ax: Axes | None = None) -> Axes:
 
 
 def abscissa(found: RigComparison) -> str:
-    """Name of the number of both rigs that differs with the largest part; that of the speed if none differs.
+    """Name of the differing parameter with the largest part, the speed if no parameter differs.
 
-    Without parts it is that whose value of the other rig changes the growth rates of both most, relative to themselves.
+    Without parts it is the parameter whose exchange changes the growth rates of both rigs most, in relative terms.
     """
     rigs: list[Any] = [one.rig for one in found.verdicts]
     first, second = ({name: one.value for name, one in rig.parameters().items()} for rig in rigs)
@@ -108,7 +107,7 @@ def _values(role: Any, own: list[float]) -> Array:
 
 
 class _Heights(NamedTuple):
-    """Curves of both rigs, words for the axis, height of the edge of stability, and whether sliding is stable above."""
+    """Curves of both rigs, axis label, ordinate of the edge of stability, and True if sliding is stable above it."""
 
     curves: list[Array]
     words: str
@@ -130,7 +129,7 @@ def _heights(found: RigComparison, rigs: list[Any], name: str, x: Array) -> _Hei
 
 
 def _paint(ax: Axes, heights: _Heights) -> None:
-    """Paint the stable and unstable side of the edge, with their words, and scale the axis."""
+    """Colour and label the stable and unstable sides of the edge, and set the y axis."""
     values = np.concatenate([*heights.curves, [heights.edge]])
     values = values[np.isfinite(values)]
     if heights.stable_above and values.min() > 0:

@@ -1,1 +1,1 @@
-"""Figures of experiments: records and what was commanded in them, fits, and what follows from them."""
+"""Figures of experiments: records with the commanded loading, fits, and predictions from fits."""

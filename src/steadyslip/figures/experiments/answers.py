@@ -1,4 +1,4 @@
-"""Figures of answers from fits: likelihood profiles, comparison of laws, ranking of experiments, predictions."""
+"""Figures of results from fits: likelihood profiles, comparison of laws, ranking of experiments, predictions."""
 
 from __future__ import annotations
 
@@ -22,14 +22,13 @@ if TYPE_CHECKING:
     from steadyslip.experiments import LawComparison, Prediction, Profile
     from steadyslip.experiments.answers.precision import Ranking
 
-MAX_AXIS_DISTANCE = 10.0  # widths of the 95 % range of draws within which the rig's own value is drawn (by trial)
+MAX_AXIS_DISTANCE = 10.0  # in widths of the draws' 95 % range: a rig farther from it is not drawn (by trial)
 
 
 def profile(result: Profile, ax: Axes | None = None) -> Axes:
-    """Plot the rise of the misfit away from the best value of a parameter, and the 68 and 95 % intervals it gives.
+    """Plot the rise of the misfit away from the best value of a parameter, and the resulting 68 and 95 % intervals.
 
-    Grey: parabola of a Gaussian likelihood with the error of the fit. Where the two differ, the likelihood is not
-    Gaussian.
+    Grey: parabola of a Gaussian likelihood with the error of the fit; the likelihood is not Gaussian where it differs.
 
     Parameters
     ----------
@@ -71,7 +70,7 @@ def profile(result: Profile, ax: Axes | None = None) -> Axes:
 
 
 def comparison(result: LawComparison, ax: Axes | None = None) -> Axes:
-    """Plot AIC and BIC of each law above the best of all.
+    """Plot AIC and BIC of each law, less the smallest of all laws.
 
     Parameters
     ----------
@@ -105,12 +104,12 @@ def comparison(result: LawComparison, ax: Axes | None = None) -> Axes:
 
 
 def _format_weight(share: float) -> str:
-    """Percent text of a weight (0 to 1), never rounded to 0 or 100 %."""
+    """Format a weight (0 to 1) in percent, never rounded to 0 or 100 %."""
     return "< 0.1 %" if share < 0.001 else "> 99.9 %" if share > 0.999 else format_percent(round(share, 3))
 
 
 def ranking(result: Ranking, ax: Axes | None = None) -> Axes:
-    """Plot, for each experiment, the expected error of one parameter.
+    """Plot the expected error of one parameter for each planned experiment.
 
     Parameters
     ----------
@@ -182,7 +181,7 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
     low, high = np.quantile(critical, [0.025, 0.975])
     if low - MAX_AXIS_DISTANCE * (high - low) <= own <= high + MAX_AXIS_DISTANCE * (high - low):
         ax.axvline(own / factor, color=VERMILION, linewidth=1.5, label="this rig")
-    else:  # an axis that reaches it would squeeze the histogram to a line
+    else:  # including it would squeeze the histogram to a line
         side = "beyond" if own > high else "below"
         ax.plot(
             [],
@@ -204,15 +203,15 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
 
 
 def _bin_count(count: int) -> int:
-    """Number of bins of a histogram of so many draws: Rice's rule, 5 to 60."""
+    """Number of bins for a histogram of `count` draws: Rice's rule, limited to 5 to 60."""
     return int(np.clip(round(2 * count ** (1 / 3)), 5, 60))
 
 
 def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
     """Plot histograms of the largest kick that the rig survives, one panel for each kind of kick.
 
-    The title has the shares of draws that are in the histogram, where no kick fails, where steady sliding is unstable,
-    and where the threshold is undecided.
+    The title has the shares of draws with a threshold (in the histogram), without one (every kick is survived), with
+    unstable steady sliding, and with an undecided threshold.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Corner plot: estimates against each other, with the regions of 68 and 95 % probability."""
+"""Corner plot: parameters of a fit against each other, with regions of 68 and 95 % probability."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from steadyslip.machine.rig import Rig
 if TYPE_CHECKING:
     from steadyslip.experiments import Estimate, Fit
 
-LEVELS = (0.68, 0.95)  # shares of the draws inside the contours, as of one and two standard deviations
+LEVELS = (0.68, 0.95)  # probability inside the contours, as of one and two standard deviations
 STYLES: tuple[Literal["-"], Literal["--"]] = ("-", "--")
-PILE_UP_SHARE = 0.02  # share of draws exactly at one end above which that end is a bound of the search (by trial)
-BINS = 48  # along each axis of the density of draws, finer than its smoothing (by trial)
-MOST_IN_COLUMN = 4  # parameters beside each other in 85 mm: names and three numbers of 7 points take some 18 mm
-TWO_COLUMNS = 180 / 25.4  # inches, two columns of a journal with the gap between them
+PILE_UP_SHARE = 0.02  # share of draws at an extreme value above which it is a bound of the search (by trial)
+BINS = 48  # bins along each axis for the density of draws: finer than its smoothing (by trial)
+MOST_IN_COLUMN = 4  # most panels side by side in 85 mm: a name and three numbers of 7 points take some 18 mm
+TWO_COLUMNS = 180 / 25.4  # inches: width of two journal columns with the gap between them
 MAX_DOTS = 4000  # draws plotted as dots; more only darken the panel (by trial)
 
 
 def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
     """Plot determined parameters against each other, with regions of 68 and 95 % probability.
 
-    For a fit they are those of its normal distribution, for draws those of their smoothed density. In a journal
+    The regions are those of the normal distribution of a fit, or of the smoothed density of draws. In a journal figure
     more than four parameters take the width of two columns.
 
     Parameters
@@ -97,7 +97,7 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
 
 
 def _letters(rig: Rig, names: Sequence[str]) -> dict[str, str]:
-    """Letters of parameters for axes, by name; short names of those without, or with one that several have."""
+    """Letters of parameters for axes, by name; short names for parameters without a letter of their own."""
     known = rig.parameters()
     letters = {name: letter_of(rig, name) for name in names if name in known}
     own = {name: letter for name, letter in letters.items() if letter and [*letters.values()].count(letter) == 1}
@@ -105,7 +105,7 @@ def _letters(rig: Rig, names: Sequence[str]) -> dict[str, str]:
 
 
 class _Scale:
-    """Display unit and label of a parameter; times are relative to the best value. Calling it converts SI values."""
+    """Display unit and label of a parameter; calling it converts SI values. Times are relative to the best value."""
 
     def __init__(self, one: Estimate, name: str) -> None:
         clock = one.unit == "s"
@@ -121,7 +121,7 @@ class _Scale:
 def _draw_normal_regions(panel: Axes, fit: Fit, names: tuple[str, str], scales: tuple[_Scale, _Scale]) -> None:
     """Plot the normal distribution of one or two search coordinates of a fit, transformed to the parameters.
 
-    It is cut at the bounds of the search, such as the samples between which a step lies.
+    It is truncated at the bounds of the search, such as the samples between which a step lies.
     """
     one, other = (fit.index(name) for name in names)
     places = [fit.coordinates[i] for i in (one, other)]
@@ -178,6 +178,6 @@ def _draw_sample(panel: Axes, x: np.ndarray, y: np.ndarray, alone: bool) -> None
 
 
 def density_level(density: np.ndarray, share: float) -> float:
-    """Density above which the given share (0 to 1) of the total lies."""
+    """Density level above which cells contain the given share (0 to 1) of the total."""
     falling = np.sort(density, axis=None)[::-1]
     return float(falling[np.searchsorted(np.cumsum(falling), share * np.sum(falling))])

@@ -27,15 +27,15 @@ if TYPE_CHECKING:
     from steadyslip.experiments import Fit, Record
 
 MAX_LAGS = 60  # lags (samples) of the autocorrelation
-MAX_STEPS = 12  # panels of `steps`: four rows of three
-MIN_STRESS_CHANGE = 0.01  # relative smooth change of normal stress below which it has no panel (by trial)
-ZOOM_SHARES = (0.15, 0.6)  # shares of the time to the previous and next step that are shown (by trial)
+MAX_STEPS = 12  # most panels of `steps`: four rows of three
+MIN_STRESS_CHANGE = 0.01  # relative smooth change of normal stress below which it is not drawn (by trial)
+ZOOM_SHARES = (0.15, 0.6)  # shares of the time to the previous and next step that are drawn (by trial)
 
 
 def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.ndarray:
     """Plot load-point rate, record and model, residuals, and their autocorrelation.
 
-    The normal stress has a panel of its own, the second, where it changes.
+    If the normal stress changes it has the second of five panels.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def _draw_record_and_model(ax: Axes, time: np.ndarray, data: np.ndarray, model: 
 
 
 def _draw_autocorrelation(ax: Axes, result: Fit, residuals: np.ndarray, record: int) -> None:
-    """Plot the autocorrelation of residuals, that of the noise model of the errors, and 95 % limits of white noise."""
+    """Plot the autocorrelation of residuals, that of the noise model, and 95 % limits of white noise."""
     lags = np.arange(min(MAX_LAGS, len(residuals) // 4) + 1)
     ax.bar(lags, autocorrelation(residuals, lags[-1]), width=0.6, color=SKY, label="residuals")
     noise = result.noise[record]
@@ -165,7 +165,7 @@ def steps(result: Fit, ax: Any = None, record: int = 0) -> np.ndarray:
 
 
 def _samples_near(data: Record, k: int) -> np.ndarray:
-    """Mask (n,) of the samples near step `k`: more after it than before, none beyond the neighbouring steps."""
+    """Mask (n,) of the samples near step `k`: more after it than before, none beyond its neighbouring steps."""
     ends = [float(data.time[0]), *(step.time for step in data.steps), float(data.time[-1])]
     before, at, after = ends[k : k + 3]
     reach = max(after - at, 1e-300)
@@ -175,7 +175,7 @@ def _samples_near(data: Record, k: int) -> np.ndarray:
 
 
 def _running_mean(values: np.ndarray) -> np.ndarray:
-    """Running mean over a fiftieth of the record, over fewer samples at its ends."""
+    """Running mean (n,) over a fiftieth of the record, over fewer samples at its ends."""
     half = max(len(values) // 100, 1)
     total = np.concatenate([[0.0], np.cumsum(values)])
     low = np.maximum(np.arange(len(values)) - half, 0)

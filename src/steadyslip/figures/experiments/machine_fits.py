@@ -1,4 +1,4 @@
-"""Figures of fits of machines: every column or response with that of the machine, and the residuals below."""
+"""Figures of fits of machines: measured columns or responses with the model's, and the residuals below."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from steadyslip.figures.style import axis_label, display_unit
 if TYPE_CHECKING:
     from steadyslip.experiments import MachineFit
 
-MAX_SERIES = 4  # columns that are drawn: more would not fit a page
+MAX_SERIES = 4  # most columns drawn: more would not fit on a page
 
 
 def machine_fit(result: MachineFit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.ndarray:
-    """Plot the columns of a record with the machine's, and the residuals of each.
+    """Plot the columns of a record with the motion of the fitted machine, and the residuals of each.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ LEGEND_DOT_SIZE = 6.0  # size of dots in a legend, points: dots of data can be t
 
 
 def stacked_panels(ax: Any, heights: tuple[float, ...], shared: int | None = None) -> np.ndarray:
-    """Axes above each other (given or new) with relative heights; the first `shared`, or all, share the x axis."""
+    """Axes (given or new) stacked with relative heights; the first `shared`, by default all, share the x axis."""
     count = len(heights)
     if ax is not None:
         return given_panels(ax, (count,), f"a sequence of {count}")
@@ -38,7 +38,7 @@ def panel_grid(ax: Any, rows: int, columns: int, size: tuple[float, float]) -> n
 
 
 def time_axis(data: Record) -> tuple[float, str, float]:
-    """Size (s) and name of the unit of a time axis, and the time (s) of its zero: first step, or else first sample."""
+    """Time axis of a record: size (s) and name of its unit, and time (s) of its zero, the first step or sample."""
     origin = data.steps[0].time if data.steps else float(data.time[0])
     factor, unit = display_unit("s", float(np.ptp(data.time)))
     return factor, unit, origin
@@ -60,12 +60,12 @@ def title_name(data: Record) -> str:
 
 
 def dot_size(count: int) -> float:
-    """Marker size in points for so many samples: smaller for more, between 2 and 6."""
+    """Marker size in points for `count` samples: smaller for more samples, between 2 and 6."""
     return float(np.clip(2.0 * np.sqrt(1000 / max(count, 1)), 2.0, 6.0))
 
 
 def commanded_curve(course: Course, data: Record, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Axis positions and commanded values of a course at the samples and at its corners between them."""
+    """Positions on the time axis and commanded values of a course, at the samples and at its corners, both (n,)."""
     ends = [t for c in course.changes for t in (c.time, c.time + max(c.duration, 1e-9 * float(np.ptp(data.time))))]
     inside = [t for t in ends if data.time[0] < t < data.time[-1]]
     moments = np.sort(np.concatenate([data.time, inside]))

@@ -20,7 +20,7 @@ ROW_OFFSET = 0.15  # vertical offset, in rows, between the estimate of an experi
 
 
 def population(result: Population, ax: Any = None) -> np.ndarray:
-    """Plot each parameter of each experiment, fitted alone and pooled, with the ranges of mean and new members.
+    """Plot each parameter of each experiment, fitted alone and pooled, with 95 % ranges of mean and a new experiment.
 
     Parameters
     ----------

@@ -23,12 +23,12 @@ from steadyslip.figures.style import axis_label, display_unit
 if TYPE_CHECKING:
     from steadyslip.experiments import Record
 
-MAX_HIDDEN_SHARE = 0.01  # largest share of rates <= 0, which a logarithmic axis hides (by trial)
+MAX_HIDDEN_SHARE = 0.01  # largest share of rates <= 0 at which a logarithmic axis, which hides them, is used (by trial)
 LOG_RATE_RATIO = 5.0  # highest over lowest commanded rate above which their axis is logarithmic (by trial)
 
 
 def record(data: Record, ax: Sequence[Axes] | None = None) -> np.ndarray:
-    """Plot friction, load-point rate and normal stress over time, with the steps and the loading found in the record.
+    """Plot friction, load-point rate and normal stress over time, with the steps and commanded loading of the record.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def record(data: Record, ax: Sequence[Axes] | None = None) -> np.ndarray:
 
 
 def draw_normal_stress(data: Record, ax: Axes, time: np.ndarray) -> None:
-    """Plot measured normal stress (total) and pore pressure, and the commanded ones found from them."""
+    """Plot the measured total normal stress and pore pressure, and the commanded courses found from them."""
     if data.total_normal is None:
         return
     size, name = display_unit("Pa", float(np.max(np.abs(data.total_normal))))

@@ -15,7 +15,7 @@ from read_pages import words
 from steadyslip import figures
 from steadyslip.core.palette import STABLE
 from steadyslip.figures.style import parameter_label
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "machines").glob("*.toml"))
 MACHINES = {path.stem: ss.read_rig(path) for path in EXAMPLES} | {
@@ -120,7 +120,7 @@ def test_what_bars_leave_out_is_said():
     assert len(ax.get_yticks()) == len(drawn)
     assert f"{len(left)} more edges not drawn" in ax.get_xlabel()
     document = ss.report(found, explorer=False).html
-    named = ", ".join(said(found.rig, name) for name in left)
+    named = ", ".join(label_of(found.rig, name) for name in left)
     assert f"the edges of {named}: a factor of 100 away or more" in words(document)
 
 

@@ -33,7 +33,7 @@ def test_each_fault_is_named_where_it_stands():
     told = _spoiled("two-surfaces", ("[bodies.left]\n", "[bodies]\nleft = 3\n[bodies.other]\n"))
     assert "bodies.left: got 3; allowed: a table [bodies.left]" in told
     assert "unknown friction law []" in _spoiled("two-guides", ('law = "rate-state"', "law = []"))
-    assert "links.'a\\nb': is no name" in _spoiled("two-guides", ("links.belt", 'links."a\\nb"'))
+    assert "links.'a\\nb': is not a valid name" in _spoiled("two-guides", ("links.belt", 'links."a\\nb"'))
     told = _spoiled("brake-pad", ('body = "pad"', 'body = "pad"\nloaded_by = "lining"'))
     assert told.endswith("'lining' pulls away from the surface only; allowed: one along the slide")
     told = _spoiled("geared-servo", ('kd = "0.5 N s/mm"', 'tn = "1 s"'))

@@ -190,7 +190,7 @@ def test_a_machine_that_does_not_hang_together_says_where(words):
 
 def test_names_must_fit_into_dotted_names():
     for name in ("a.b", "1st", "", "x" * 50):
-        with pytest.raises(ss.ParameterError, match="is no name"):
+        with pytest.raises(ss.ParameterError, match="is not a valid name"):
             ss.Machine(bodies={name: ss.machine.SlidingBody()}, contacts={}, drive=ss.machine.Pull(velocity=1.0))
     with pytest.raises(ss.ParameterError, match=r"bodies\.ground"):
         ss.Machine(bodies={"ground": ss.machine.SlidingBody()}, contacts={}, drive=ss.machine.Pull(velocity=1.0))

@@ -18,7 +18,7 @@ MISTAKES = {
     "a per cent sign behind the unit": (
         '"2.56..3.84 kN"',
         '"3.2 ± 20 kN %"',
-        "the per cent sign stands behind its number",
+        "the per cent sign must follow its number",
     ),
     "a range in words": ('"2.56..3.84 kN"', '"2.56 to 3.84 kN"', "or '10..14 N/um'"),
     "a distribution of another name": ('"2.56..3.84 kN"', '"3.2 ± 0.2 kN (gauss)"', "'12 ± 2 N/um (normal)'"),
@@ -138,7 +138,7 @@ def test_a_mistake_has_one_message(right, wrong, answer):
     [
         (
             "sample_time = 0",
-            "sample_time: got 0; allowed: a finite number > 0 in s, or text such as '1 ms'; for none leave it out",
+            "sample_time: got 0; allowed: a finite number > 0 in s, or text such as '1 ms'; or leave it out",
         ),
         ('sample_time = "1 mm"', "expected a quantity in s, for example '1 ms'"),
         ('delay = "2 mm"', "expected a quantity in s, for example '2 ms'"),

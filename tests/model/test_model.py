@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import steadyslip as ss
-from steadyslip.core.questions import Keeper, question
+from steadyslip.core.caching import HasCache, cached
 from steadyslip.model import build_model
 from steadyslip.model.linearisation import characteristic_coefficients, linearise
 from steadyslip.model.point import operating_point
@@ -27,12 +27,12 @@ RIG = ss.Slider(
 INCLINED = replace(RIG, contact=ss.laws.InclinedSpring(preload=5e6, angle=0.3))
 
 
-class Oracle(Keeper):
+class Oracle(HasCache):
     def __init__(self):
         self.asked = 0
 
 
-@question
+@cached
 def twice(whom, number, add=0):
     whom.asked += 1
     return 2 * number + add

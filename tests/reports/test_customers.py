@@ -26,7 +26,7 @@ from steadyslip.laws.friction.normal_memory import NormalMemory
 from steadyslip.linear.formula import MEANINGS, formula_in_parts
 from steadyslip.machine.bodies import Body
 from steadyslip.machine.drive import Drive
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 from steadyslip.machine.links import Link
 from steadyslip.machine.servo import MachineDrive, kind_of_control
 from steadyslip.machine.surfaces import Surface
@@ -157,12 +157,12 @@ def test_a_stable_rig_is_kept_only_where_it_is_surely_stable():
         cured = ss.cure(rig, {"friction.states.1.b": width})
         if not kept:
             to = cured.best.written(cured.best.nearest)
-            assert f"Change {said(rig, cured.best.parameter)} from" in text
+            assert f"Change {label_of(rig, cured.best.parameter)} from" in text
             assert f"to {to}: with this change alone it is stable in 95 % of them" in text
             assert "measuring evolution effect b₁" in text
             assert "steadyslip" not in text
         for one in () if kept else (one for one in cured.windows if one.value):
-            assert said(rig, one.parameter) in text
+            assert label_of(rig, one.parameter) in text
             far = one.nearest is not None and not 0.1 <= one.nearest / one.value <= 10
             assert (str(one) in text) == (bool(one.windows) and not far)
 
@@ -191,7 +191,7 @@ def test_what_is_recommended_is_kept(name):
     text = words("".join(recommendation(ss.analyze(rig))))
     what, value = re.search(r"Change (.*?) from .*? to (.*?)\. Then ", text).groups()
     assert "No edge is then nearer than 20 %" in text
-    (changed,) = (one for one in rig.parameters() if words(said(rig, one)) == what)
+    (changed,) = (one for one in rig.parameters() if words(label_of(rig, one)) == what)
     kept = words("".join(recommendation(ss.analyze(rig.with_values({changed: rig.read(changed, value)})))))
     assert "Keep it as it is." in kept
 
@@ -231,11 +231,11 @@ def test_a_small_margin_is_told():
     near = [one for one in found.margins if one.edge is not None and abs(one.relative) < 0.2]
     assert len(near) > 4
     assert len(re.findall(r"[+−-][\d.]+ %", listed)) == len(near)
-    assert all(f"{said(rig, one.parameter)} at " in listed for one in near)
+    assert all(f"{label_of(rig, one.parameter)} at " in listed for one in near)
     rows = [re.findall("<t[dh][^>]*>(.*?)</t[dh]>", row) for row in re.findall("<tr>(.*?)</tr>", page)[1:]]
     assert len(rows) == 4
     for name, _, to, then, far in rows:
-        (full,) = [one for one in rig.parameters() if said(rig, one) == words(name)]
+        (full,) = [one for one in rig.parameters() if label_of(rig, one) == words(name)]
         changed = ss.analyze(rig.with_values({full: rig.read(full, words(to).replace("−", "-"))}))
         least = min(abs(one.relative) for one in changed.margins if one.edge is not None)
         assert changed.stable
@@ -399,7 +399,7 @@ def test_two_rigs_are_told_beside_each_other():
     assert "old: unstable; new: unstable" in text
     for one in found.differences:
         if one.parameter in a.parameters():
-            assert said(a, one.parameter) in text
+            assert label_of(a, one.parameter) in text
     assert "nearest edge evolution effect b" in text
     assert "Inputs of old" in text
     assert "Inputs of new" in text
@@ -494,7 +494,7 @@ def test_a_recommendation_says_why(name):
     if found.origin is not None:
         assert f"Why it is unstable: {found.origin.words}." in text
         name, to = re.findall(r"Change (.*?) from .*? to (.*?)\. Then every small disturbance dies out;", text)[0]
-        (full,) = [one for one in found.rig.parameters() if said(found.rig, one) == name]
+        (full,) = [one for one in found.rig.parameters() if label_of(found.rig, one) == name]
         assert ss.analyze(found.rig.with_values({full: found.rig.read(full, to.replace("\u2060", ""))})).stable
         return
     value, ratio, critical = map(float, re.findall(r"Then the stiffness ([\d.]+) GPa/m is ([\d.]+) times the critical "

@@ -22,7 +22,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.files.html_document import write_page
-from steadyslip.machine.letters import said, worded, words_of
+from steadyslip.machine.letters import label_of, worded, words_of
 from steadyslip.nonlinear.kicks.several_kicks import Thresholds
 from steadyslip.reports.brief import _HIDDEN, DIMENSIONLESS, RESULT_UNIT, UNITS, brief, result_html, unit_of
 from steadyslip.reports.results import MAX_ROWS, _distinct_rows, protocol_table
@@ -148,7 +148,7 @@ def test_one_parameter_has_one_name_in_a_report(path):
     inputs, _, edges = text.partition("How far is the edge?")
     for one in ss.analyze(found).margins:
         assert words_of(found, one.parameter) in inputs, one.parameter
-        assert said(found, one.parameter) in edges, one.parameter
+        assert label_of(found, one.parameter) in edges, one.parameter
     assert [name for name in found.parameters() if name in text] == []
 
 

@@ -6,7 +6,7 @@ import pytest
 
 import steadyslip as ss
 from data_sheets import SHEETS
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 
 
 @pytest.mark.parametrize("name", SHEETS)
@@ -71,4 +71,4 @@ def test_the_edge_of_the_first_line_is_that_of_the_first_row(name):
     first = next(row.split()[0] for row in rows if " -> " in row)
     assert with_edge[0].parameter.endswith(first)
     if "nearest edge is that of" in " ".join(text.split()):
-        assert f"nearest edge is that of {said(found.rig, with_edge[0].parameter)}" in " ".join(text.split())
+        assert f"nearest edge is that of {label_of(found.rig, with_edge[0].parameter)}" in " ".join(text.split())

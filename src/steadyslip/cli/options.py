@@ -12,7 +12,7 @@ import typer
 def _set_units(context: typer.Context, rig: Path) -> Path:
     """Set the output units to those used in the rig file."""
     from steadyslip.core.errors import ParameterError
-    from steadyslip.core.quantities import units_told
+    from steadyslip.core.quantities import result_units
     from steadyslip.files.specifications.deviations import taken_out
     from steadyslip.files.specifications.read import text_of
     from steadyslip.files.specifications.toml import NotToml, tables_of
@@ -20,7 +20,7 @@ def _set_units(context: typer.Context, rig: Path) -> Path:
     with suppress(ParameterError, NotToml):  # problems of the file are reported when the rig is read
         tables = tables_of(text_of(rig))
         taken_out(tables)
-        _print_in(context, units_told(tables))
+        _print_in(context, result_units(tables))
     return rig
 
 

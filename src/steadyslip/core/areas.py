@@ -12,7 +12,7 @@ from steadyslip.core.written import display_names
 
 AREA = Dimension(length=2)
 TOTALS = ("N", "N/m", "N s/m", "N/m/s", "kg", "N s")
-"""Units of totals that have a common name; others are written as the per-area unit times m^2."""
+"""Units of totals with a common name; any other total has the per-area unit times m^2, such as ``Pa s m^2``."""
 
 
 def is_per_area(unit_name: str) -> bool:
@@ -31,9 +31,9 @@ def total_unit(unit_name: str) -> str:
 
 
 def outside(unit_name: str, area: float | None) -> tuple[float, str]:
-    """Factor and unit that turn an inside value into one for users: the total of the contact if there is an area (m²).
+    """Factor and unit that make a stored per-area value the total of an area (m²); 1 and the unit itself without area.
 
-    Reading and tables use this function; printing and drawing as well, of the area that `told_area` leaves.
+    Readers and tables pass the rig's area; text and figures pass the area that `display_area` returns.
 
     >>> outside("Pa/m", 0.01), outside("Pa/m", None), outside("m/s", 0.01)
     ((0.01, 'N/m'), (1.0, 'Pa/m'), (1.0, 'm/s'))
@@ -41,16 +41,16 @@ def outside(unit_name: str, area: float | None) -> tuple[float, str]:
     return (area, total_unit(unit_name)) if area is not None and is_per_area(unit_name) else (1.0, unit_name)
 
 
-def told_area(unit_name: str, area: float | None) -> float | None:
-    """The area (m²), or None if the file of the context has an area but writes such quantities as stresses.
+def display_area(unit_name: str, area: float | None) -> float | None:
+    """Area (m²) for `outside` when results are displayed; None to display stresses, as the rig's file does.
 
-    It does where it has this per-area unit and not the total's, such as MPa and no N; where it has neither, as in most
-    of its other quantities. What reads, and what computers read, does not ask. An area that is not from the file, but
-    was given to the rig later, makes forces of all.
+    Stresses are displayed if the display units (`steadyslip.core.written`) contain the per-area unit and not the unit
+    of the total, such as MPa and no N. If they contain neither, the file's other quantities decide. If they contain no
+    unit of area, the area was given to the rig later, and totals are displayed. Readers and exports do not call this.
 
     >>> from steadyslip.core.written import display_units
     >>> with display_units(["MPa", "N/um", "cm^2"]):
-    ...     told_area("Pa", 0.01), told_area("Pa/m", 0.01)
+    ...     display_area("Pa", 0.01), display_area("Pa/m", 0.01)
     (None, 0.01)
     """
     if area is None or not is_per_area(unit_name):
@@ -66,7 +66,7 @@ def told_area(unit_name: str, area: float | None) -> float | None:
 
 @lru_cache(maxsize=256)
 def _families(names: frozenset[str]) -> tuple[frozenset[Dimension], frozenset[Dimension]]:
-    """Dimensions of the quantities per area and areas, and of the totals, among units."""
+    """Dimensions among the named units, in two sets: areas and quantities per area; totals."""
     found = {unit(name)[1] for name in names}
     forces = {unit(name)[1] for name in TOTALS}
     return frozenset(one for one in found if one == AREA or one.times(AREA) in forces), frozenset(found & forces)
@@ -97,5 +97,5 @@ def _times(value: float | None, factor: float) -> float | None:
 
 
 def stress_name(name: str, area: float | None) -> str:
-    """A name with "stress" replaced by "force" if the rig has an area, and is told in forces."""
-    return name if told_area("Pa", area) is None else name.replace("stress", "force")
+    """Name of a quantity, with "stress" replaced by "force" if it is displayed as a total of the area (m²)."""
+    return name if display_area("Pa", area) is None else name.replace("stress", "force")

@@ -56,7 +56,7 @@ def _numbers(value: Any) -> np.ndarray:
 
 
 def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> None:
-    """Check arrays of a record's numbers against the conditions between several parameters.
+    """Check arrays in place of a record's numbers against its conditions between several parameters.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any])
 
 
 def valid_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> Any:
-    """Mask of the positions at which all conditions between several parameters hold, (bool or array of bool)."""
+    """True where all conditions between several parameters hold; bool, or array of bool for arrays."""
     valid: Any = True
     for _, condition in conditions(with_values(record, varied, prefix), prefix):
         valid = valid & np.asarray(condition.holds)
@@ -84,11 +84,11 @@ class BroadcastArrays:
     Attributes
     ----------
     values : dict of str to ndarray or float
-        As given; DataArrays as plain arrays with the dimensions of all.
+        Arrays by name, not broadcast yet; DataArrays as plain arrays with all of `dims`.
     shape : tuple of int
         Broadcast shape.
     dims, coords
-        Dimensions and coordinates of the DataArrays; None if there are none.
+        Dimensions and coordinates of the broadcast DataArrays; None if all arrays are plain.
     """
 
     values: dict[str, Any]
@@ -102,8 +102,9 @@ class BroadcastArrays:
 
     @property
     def wrap(self) -> Callable[..., Any]:
-        """Function ``wrap(array, name, unit, extra_dims)`` that makes a result with leading axes `shape` a DataArray,
-        if the input had DataArrays; otherwise it returns the array, or a float for a single value.
+        """Function ``wrap(array, name, unit, extra_dims)`` for results whose leading axes are `shape`.
+
+        It returns a DataArray if the input had DataArrays, otherwise the array, or a float for a single value.
         """
         return _bare if self.dims is None else self._labelled
 
@@ -125,7 +126,7 @@ def broadcast(named: Mapping[str, Any]) -> BroadcastArrays:
     Raises
     ------
     ParameterError
-        If their shapes do not go together, one is empty, or a bare array stands beside DataArrays.
+        If the shapes do not broadcast, an array is empty, or plain arrays and DataArrays are mixed.
     """
     problems = [Problem(n, "got an empty array; give at least one value") for n, v in named.items() if not np.size(v)]
     labelled = {name: value for name, value in named.items() if hasattr(value, "dims")}
@@ -135,7 +136,7 @@ def broadcast(named: Mapping[str, Any]) -> BroadcastArrays:
         import xarray as xr
 
         bare = [name for name, value in named.items() if name not in labelled and np.ndim(value)]
-        problems += [Problem(name, "is a bare array beside DataArrays; name its dimensions") for name in bare]
+        problems += [Problem(name, "is a bare array beside DataArrays; make it a DataArray, too") for name in bare]
         together = xr.broadcast(*labelled.values())
         dims, coords = tuple(map(str, together[0].dims)), together[0].coords
         values |= {name: array.values for name, array in zip(labelled, together, strict=True)}

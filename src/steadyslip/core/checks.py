@@ -1,4 +1,4 @@
-"""Independent checks of the numbers in a result, for all kinds of results."""
+"""Record of an independent check of a number in a result, and summaries of such checks."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def check(what: str, how: str, error: float, allowed: float) -> Check:
 
 
 def in_words(checks: Sequence[Check]) -> str:
-    """Summary in one line: numbers that passed, or failed; empty without checks."""
+    """One-line summary with the names of the numbers that failed and that passed; empty without checks."""
     failed = [one.what for one in checks if not one.passed]
     edges = sum(one.passed and one.what.startswith("edge of ") for one in checks)
     passed = [one.what for one in checks if one.passed and not one.what.startswith("edge of ")]
@@ -57,6 +57,6 @@ def in_words(checks: Sequence[Check]) -> str:
 
 
 def as_data(checks: Sequence[Check]) -> dict[str, Any]:
-    """Checks as a dict for JSON: the summary as ``checked``, and every check; unknown errors are None."""
+    """Checks as a dict for JSON: ``checked`` is the summary, ``checks`` a list of all; infinite errors are None."""
     listed = [asdict(one) | {"error": one.error if math.isfinite(one.error) else None} for one in checks]
     return {"checked": in_words(checks), "checks": listed}

@@ -1,4 +1,4 @@
-"""Differences between two records, and records that have some of their values from one and some from the other."""
+"""Differences between two records, and copies of one record with some values from the other."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ R = TypeVar("R", bound=FrozenRecord)
 
 @dataclass(frozen=True)
 class Differing:
-    """A place at which two records differ.
+    """A parameter, option, law or member in which two records differ.
 
     Attributes
     ----------
     name : str
         Dotted name of a parameter, an option, a law or a member.
     first, second : object
-        What is there: numbers in SI units, words, records; None if nothing is.
+        Values in the two records: numbers in SI units, words or records; None if a record has no value.
     role : Parameter or None
-        Of a number.
+        Role of the parameter; None if the values are not numbers.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Differing:
 
 
 def differing(first: FrozenRecord, second: FrozenRecord, prefix: str = "") -> Iterator[Differing]:
-    """Yield the places at which two records differ; where laws differ, the whole law."""
+    """Yield the fields in which two records differ; if their laws differ, the whole laws."""
     if type(first) is not type(second):
         yield Differing(prefix.rstrip("."), first, second, None)
         return
@@ -53,12 +53,12 @@ def differing(first: FrozenRecord, second: FrozenRecord, prefix: str = "") -> It
 
 
 def mixed(first: R, second: R, taken: Collection[str], prefix: str = "") -> R:
-    """Copy of the first record with what the second has at the places `taken`; checked by the constructors.
+    """Copy of the first record with the second's values of the dotted names `taken`; checked by the constructors.
 
     Raises
     ------
     ParameterError
-        If such a record is not allowed.
+        If the mixed record has forbidden values or combinations.
     """
     if type(first) is not type(second):
         return second if prefix.rstrip(".") in taken else first
@@ -84,7 +84,10 @@ def mixed(first: R, second: R, taken: Collection[str], prefix: str = "") -> R:
 def _pairs(
     role: Declared, one: Any, other: Any, name: str, prefix: str
 ) -> list[tuple[str, FrozenRecord | None, FrozenRecord | None]] | None:
-    """Records in a field of both, each with the prefix of its names, None for one that lacks it; None of a value."""
+    """Prefix and members of both records for each member of a field; None if the field has no comparable members.
+
+    A member that only one of the records has is None in the other's place.
+    """
     if not isinstance(role, Part) or one is None or other is None:
         return None
     if role.many:

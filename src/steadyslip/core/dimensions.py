@@ -1,6 +1,6 @@
 """Units and their dimensions, such as ``kg/m^2``: words with small integer powers, multiplied or divided.
 
-Common units are in the table below; pint is asked for all others.
+Common units are in the table below; all others are looked up in pint.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Dimension(NamedTuple):
 
 _PREFIX = {"T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 MICRO = str.maketrans({"µ": "u", "μ": "u", "·": " ", "×": " ", "−": "-"})
-"""Translation of Unicode signs in units (µ, ·, ×, −) to the ASCII ones of the table."""
+"""Translation of Unicode signs in units (µ, ·, ×, −) to ASCII."""
 _PREFIXED = {
     "Pa": Dimension(1, -1, -2),
     "N": Dimension(1, 1, -2),
@@ -71,11 +71,11 @@ for _base, _dimension in _PREFIXED.items():
 PLAIN_WORDS = {"1", "kg", "rad", *_PREFIXED}
 """SI unit words without a prefix."""
 PREFIXABLE = PLAIN_WORDS | {prefix + base for base in _PREFIXED for prefix in _PREFIX}
-"""SI unit words with every prefix and without."""
+"""SI unit words without a prefix and with each prefix."""
 
 _TOKEN = re.compile(r"\s*(?:([/()]|\*(?!\*))|([^\W\d_]+|[%°])(?:\s*(?:\^|\*\*)\s*([-+]?[0-9]+)|([0-9]+))?)\s*")
 _RUN_TOGETHER = re.compile(r"([TGMkmun]?N|[TGMk]?Pa|kg(?=m|cm)|g(?=[cm]m))(m|mm|cm)?(s)?")
-"""Words that data sheets run together: Nm, kNmm, Nms, Ns, Pas, kgm (of kgm^2), gcm."""
+"""Matches products of units without a space, as in data sheets: Nm, kNmm, Nms, Ns, Pas, kgm (of kgm^2), gcm."""
 _AT = re.compile(r"(.+?)\s+at\s+((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)", re.A)
 _ONE = re.compile(r"1\s*(?=/|$)")
 _SUPERSCRIPT = re.compile("[⁻⁺]?[⁰¹²³⁴-⁹]+")
@@ -93,9 +93,10 @@ def unit(text: str) -> tuple[float, Dimension]:
     A unit is words with small integer powers, multiplied or divided: ``kg/m^2``, ``N s/m``, ``1/(m s)``. As in
     arithmetic, a slash divides by the one factor after it. Words missing from the table are looked up in pint.
 
-    Words that data sheets run together are parted: ``Nm``, ``Nms/rad``, ``kgcm^2``.
+    Products without a space, as in data sheets, are split: ``Nm``, ``Nms/rad``, ``kgcm^2``.
 
-    With ``at`` it is per that quantity: ``"N/um at 3.2 kN"`` are 1/m, the stiffness of bristles per load.
+    A quantity after ``at`` divides the unit: ``"N/um at 3.2 kN"`` is a multiple of 1/m, the stiffness of bristles
+    per load.
 
     >>> factor, dimension = unit("N/um at 4 kN")
     >>> factor, dimension == unit("1/m")[1]
@@ -112,7 +113,7 @@ def unit(text: str) -> tuple[float, Dimension]:
         factor, dimension = unit(whole[1])
         size, per = unit(whole[3])
         if not 0 < float(whole[2]) * size < math.inf:
-            raise QuantityError(f"{text!r} is at no load above zero")
+            raise QuantityError(f"{text!r} is not a unit: the load after 'at' must be finite and > 0")
         return factor / (float(whole[2]) * size), dimension.times(per, -1)
     factor, dimension = 1.0, Dimension()
     for word, power in factors(text):
@@ -120,7 +121,7 @@ def unit(text: str) -> tuple[float, Dimension]:
         factor *= float(np.float64(value) ** power)  # inf where a float would raise
         dimension = dimension.times(base, power)
     if not 0 < factor < math.inf:
-        raise QuantityError(f"{text!r} leaves the range of floating point")
+        raise QuantityError(f"{text!r} is not a unit: its SI factor overflows or underflows")
     return factor, dimension
 
 
@@ -160,7 +161,7 @@ def factors(text: str) -> Iterator[tuple[str, int]]:
 
 
 def _parted(word: str) -> tuple[str, ...]:
-    """Words that a data sheet runs together, parted: Nm is a torque, and kgm^2 an inertia."""
+    """Unit words in a product without a space, such as N and m in Nm; the word itself if it is a single unit."""
     whole = None if word in _TABLE else _RUN_TOGETHER.fullmatch(word)
     return tuple(filter(None, whole.groups())) if whole else (word,)
 
@@ -182,7 +183,7 @@ def _from_pint(word: str) -> tuple[float, Dimension]:
         raise fault
     known = {"[mass]": "mass", "[length]": "length", "[time]": "time"}
     if not set(exponents) <= set(known):
-        raise QuantityError(f"{word!r} has a dimension that no parameter has")
+        raise QuantityError(f"{word!r} has a dimension other than mass, length, time and angle, which all units are of")
     return one, Dimension(angle=angle, **{known[key]: float(power) for key, power in exponents.items()})
 
 

@@ -1,4 +1,4 @@
-"""Domains: intervals of allowed parameter values; and conditions between several numbers of a record."""
+"""Intervals of allowed parameter values (`Domain`), and conditions between several numbers of a record."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from steadyslip.core.errors import Problem
 
 @dataclass(frozen=True)
 class Domain:
-    """Interval of allowed values, open or closed at each end, of integers only if `whole`; `text` describes it.
+    """Interval of allowed values, open or closed at each end; `text` describes it in messages.
 
-    `apart` is a single value outside of it that a record may have, but that is not reached by varying the parameter.
+    With `whole`, only integers are allowed. `apart` is one more allowed value of a record, outside the interval, which
+    varying the parameter does not reach.
     """
 
     low: float
@@ -27,7 +28,7 @@ class Domain:
     apart: float | None = None
 
     def contains(self, value: Any) -> Any:
-        """Test values elementwise; False for NaN and infinity."""
+        """True for values inside the domain, elementwise for arrays; False for NaN and infinity."""
         above = value >= self.low if self.low_allowed else value > self.low
         below = value <= self.high if self.high_allowed else value < self.high
         return above & below & np.isfinite(value) & (not self.whole or np.floor(value) == value)
@@ -45,7 +46,7 @@ real = Domain(-_INF, _INF, True, True, "a finite number")
 share = Domain(0, 1, True, True, "a number from 0 to 1")
 chance = Domain(0, 1, False, True, "a number above 0, up to 1 (100 %)")
 below_one = Domain(0, 1, True, False, "a number from 0 to below 1")
-tolerance = Domain(1e-14, 0.1, True, True, "a number from 1e-14 to 0.1")  # from some roundings of a float on
+tolerance = Domain(1e-14, 0.1, True, True, "a number from 1e-14 to 0.1")  # 1e-14 is some tens of rounding errors
 steps = Domain(1, 1e12, True, True, "a whole number from 1 to 1e12", whole=True)  # upper bound chosen by trial
 angle = Domain(-math.pi / 2, math.pi / 2, False, False, "an angle between -90 deg and 90 deg, both excluded")
 line = Domain(
@@ -59,14 +60,14 @@ count = Domain(1, 100_000, True, True, "a whole number from 1 to 100000", whole=
 
 @dataclass(frozen=True)
 class Condition:
-    """A condition between several numbers of a record, evaluated.
+    """A condition between several numbers of a record, with its truth for the record's values.
 
     Attributes
     ----------
     name : str
-        Field named in the message, or a member of one, such as ``contacts.guide``.
+        Field named in the message, or a member of a field, such as ``contacts.guide``.
     holds : bool or ndarray of bool
-        One value per rig if the numbers are arrays.
+        True if the condition is met; one value per rig if the numbers are arrays.
     message : str
         Message for a failure: what was given and what is allowed, with a ``{}`` for each of `numbers`.
     numbers : tuple of float or ndarray
@@ -79,7 +80,7 @@ class Condition:
     numbers: tuple[Any, ...] = ()
 
     def problem(self, name: str = "") -> Problem | None:
-        """The Problem at the first position where the condition fails; None if it holds everywhere."""
+        """Problem for the first position at which the condition fails; None if it is met everywhere."""
         holds = np.asarray(self.holds)
         if np.all(holds):
             return None

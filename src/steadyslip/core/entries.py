@@ -1,4 +1,4 @@
-"""Field types of file tables besides parameters: choices, text, integers, names, intervals, quantities."""
+"""Field types of file tables other than parameters: choices, text, integers, names, intervals, quantities."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Names(Entry):
 
 @dataclass(frozen=True)
 class LabelledNumbers(Entry):
-    """Field type: finite numbers of several things, a tuple in their order or a dict by their labels."""
+    """Field type: several dimensionless finite numbers, as a tuple or as a dict by labels."""
 
     doc: str
 
@@ -131,7 +131,7 @@ class LabelledNumbers(Entry):
 
 @dataclass(frozen=True)
 class Headings(Entry):
-    """Field type: a column of a file for each name: its heading or number from 1, or a pair of that and its unit."""
+    """Field type: dict of names to columns of a data file, each a heading, a number from 1, or a pair with the unit."""
 
     doc: str
 
@@ -188,7 +188,7 @@ class Whole(Entry):
 
 @dataclass(frozen=True)
 class Span(Entry):
-    """Field type: a pair of numbers, start and end, in the SI unit."""
+    """Field type: interval as a pair of SI numbers or texts with units, start and end."""
 
     doc: str
     unit: str
@@ -215,7 +215,7 @@ class Span(Entry):
 
 @dataclass(frozen=True)
 class Quantity(Entry):
-    """Field type: an SI number, or text with a unit, whose dimension another entry of the file sets."""
+    """Field type: an SI number, or text with a unit; another entry of the file sets its dimension."""
 
     doc: str
 

@@ -1,4 +1,4 @@
-"""Exceptions; each message names the thing, shows the value, and says what is allowed and what to do."""
+"""Exceptions and helpers for their messages: each states the parameter, its value, what is allowed and what to do."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def one(name: str) -> str:
 
 
 def repr_short(value: object) -> str:
-    """The repr of a value for a message: cut after `MOST_SHOWN` characters; raises nothing.
+    """Text of a value for a message: its repr, cut after `MOST_SHOWN` characters; raises nothing.
 
     >>> repr_short("5 MPa"), repr_short("a" * 1000)[-32:]
     ("'5 MPa'", 'aaa... (1002 characters in all)')
@@ -62,14 +62,14 @@ class Problem:
         return f"{where}{self.name}: {self.message}"
 
     def under(self, prefix: str) -> Problem:
-        """Copy of the problem with a prefix before its dotted name."""
+        """Copy of the problem with a prefix and a dot before its name."""
         name = ".".join(part for part in (prefix, self.name) if part)
         return Problem(name, self.message, self.line)
 
 
 SHOWN = 30
 """Number of problems listed in a message (chosen by trial); `ParameterError.problems` has all of them."""
-ADVICE = 40  # characters from which a clause is advice that is not repeated; shorter ones belong to their line
+ADVICE = 40  # clauses of at least this many characters are advice, printed once; shorter ones stay in every line
 
 
 class ParameterError(SteadyslipError, ValueError):
@@ -92,7 +92,7 @@ class ParameterError(SteadyslipError, ValueError):
 
 
 def _advised_once(lines: Sequence[str]) -> list[str]:
-    """Lines without advice, a long clause after a semicolon, that a line before has given."""
+    """Lines of a message, each without the advice (long clauses after a semicolon) that an earlier line contains."""
     found: list[str] = []
     given: set[str] = set()
     for line in lines:
@@ -104,12 +104,12 @@ def _advised_once(lines: Sequence[str]) -> list[str]:
 
 
 def _is_advice(clause: str) -> bool:
-    """True for a long clause that is not a part of a bracket, which would stay open without it."""
+    """True for a long clause with balanced brackets, so that removing it leaves no bracket open."""
     return len(clause) >= ADVICE and clause.count("(") == clause.count(")")
 
 
 class RigFileError(ParameterError):
-    """A rig file cannot be read; ``problems`` lists everything wrong with it."""
+    """A rig file cannot be read; ``problems`` lists all faults found in it."""
 
 
 class QuantityError(SteadyslipError, ValueError):
@@ -117,7 +117,7 @@ class QuantityError(SteadyslipError, ValueError):
 
 
 class UnknownNameError(SteadyslipError, LookupError):
-    """A name is not one of those allowed."""
+    """A name is not among the allowed names, which the message lists."""
 
     def __init__(self, what: str, name: object, allowed: Iterable[str]) -> None:
         self.message = unknown_name(what, name, allowed)
@@ -138,7 +138,7 @@ class NoSteadySliding(SteadyslipError, ValueError):
         Value of the quantity that would have to be positive (Pa for lift-off, dimensionless
         for lock-up); NaN if there is no such quantity.
     contact : str
-        Name of the contact of a machine that fails; empty if it is no single one.
+        Name of the machine's contact at which the condition fails; empty if it is not a single contact.
     """
 
     def __init__(self, message: str, condition: str, shortfall: float = float("nan"), contact: str = "") -> None:
@@ -149,7 +149,7 @@ class NoSteadySliding(SteadyslipError, ValueError):
 
 
 class NotAvailable(SteadyslipError, ValueError):
-    """A quantity does not exist or is not implemented for this rig; the message says why and what to ask instead."""
+    """A quantity does not exist or is not implemented for this rig; the message has the reason and an alternative."""
 
 
 class OutOfRangeWarning(UserWarning):
@@ -161,7 +161,7 @@ class IllPosedWarning(UserWarning):
 
 
 class UndecidedWarning(UserWarning):
-    """Part of the answer is not known: edges in a part of a range, eigenvalues among infinitely many."""
+    """Part of a result is not known, such as edges in part of a range, or some of infinitely many eigenvalues."""
 
 
 class UnitWarning(UserWarning):
@@ -194,12 +194,12 @@ _LETTERS = str.maketrans(
 
 
 def _letters(word: str) -> str:
-    """Last part of a dotted name without case and marks: ``dc`` of ``friction.d_c`` as of ``Dc``."""
+    """Last part of a dotted name in lower case without _ and -: ``dc`` for ``friction.d_c`` and for ``Dc``."""
     return word.rpartition(".")[2].replace("_", "").replace("-", "").lower()
 
 
 def named_in(name: str, texts: Mapping[str, str]) -> list[str]:
-    """Keys of the texts that have a word or a letter, such as ``mu_s`` for μ_S or ``ratio`` for a gear ratio.
+    """Keys of the texts that contain `name` as a word or as a symbol, such as ``mu_s`` for μ_S.
 
     >>> named_in("mu_s", {"mu_static": "static friction coefficient μ_S", "mass": "mass m"})
     ['mu_static']
@@ -212,10 +212,10 @@ def unknown_name(
     what: str, name: object, allowed: Iterable[str], guess: bool = True, meanings: Mapping[str, str] | None = None,
     taken: Iterable[str] = ()
 ) -> str:  # fmt: skip
-    """Message that a name is unknown, with all allowed names and, if `guess`, the one meant.
+    """Message that a name is unknown, with all allowed names and, if `guess`, the name that was probably meant.
 
-    That is the only one whose meaning has that word or letter, or the nearest; of those `taken`, given already, only
-    one that is nearly the same.
+    The guess is the only allowed name with the same letters or with the word in its meaning (`meanings`, text by name),
+    or else the most similar name. Names that are `taken`, because the user has given them too, must be nearly equal.
     """
     allowed, taken = list(allowed), set(taken)
     free = [one for one in allowed if one not in taken]
@@ -232,7 +232,7 @@ def unknown_name(
 
 
 def keywords_of(function: Callable[..., object], without: Iterable[str] = ()) -> list[str]:
-    """Names of the arguments of a function that can be given by name, but for those left out."""
+    """Names of a function's arguments that can be passed by keyword, except those in `without`."""
     return [
         name
         for name, item in inspect.signature(function).parameters.items()
@@ -241,7 +241,7 @@ def keywords_of(function: Callable[..., object], without: Iterable[str] = ()) ->
 
 
 def refuse_unknown(function: str, given: Iterable[str], allowed: Iterable[str], what: str = "option") -> None:
-    """Raise ParameterError if a public function, named in the message, does not take all options given.
+    """Raise ParameterError if some of the `given` option names are not `allowed` for the public function named.
 
     >>> refuse_unknown("fit", ["start"], ["starts", "effort"])
     Traceback (most recent call last):

@@ -1,4 +1,4 @@
-"""Array functions made of SymPy expressions, and the one elementary function that SymPy lacks."""
+"""NumPy and mpmath functions compiled from SymPy expressions, faster derivatives, and the function asinh(x exp(y))."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ class asinh_exp(sp.Function):  # type: ignore[misc]  # noqa: N801  # named like 
 
 
 LONG_POWER = 4
-"""Power of ten, of either sign, from which formulas show a number as such, as 10⁻²⁴."""
+"""Formulas show powers of ten with an exponent of at least this size, of either sign, as such: 10⁻²⁴."""
 
 
 def power_of_ten(number: sp.Rational) -> int:
-    """Power of ten that a number is; 0 for one and for all others.
+    """Exponent n if the number is 10^n; 0 for 1 and for numbers that are no power of ten.
 
     >>> power_of_ten(sp.Rational(1, 10**24)), power_of_ten(sp.Integer(1000)), power_of_ten(sp.Rational(3, 10))
     (-24, 3, 0)
@@ -64,7 +64,7 @@ def power_of_ten(number: sp.Rational) -> int:
 
 
 class _Latex(LatexPrinter):  # type: ignore[misc]  # SymPy has no types
-    """Printer of LaTeX with powers of ten in place of numbers of many zeros."""
+    """LaTeX printer that writes long powers of ten as 10^{n}."""
 
     def _print_Rational(self, number: sp.Rational) -> str:  # noqa: N802 -- SymPy's name
         power = power_of_ten(number)
@@ -76,17 +76,17 @@ class _Latex(LatexPrinter):  # type: ignore[misc]  # SymPy has no types
 
 
 def latex(expression: sp.Basic) -> str:
-    """LaTeX of an expression, numbers such as 10⁻²⁴ as powers of ten."""
+    """LaTeX of an expression, in which numbers such as 10⁻²⁴ are written as powers of ten."""
     text: str = _Latex().doprint(expression)
     return text
 
 
 def numpy_asinh_exp(x: Any, y: Any) -> Any:
-    """Values of asinh(x exp(y)) for arrays; nothing overflows or underflows on the way unless x exp(y) does."""
+    """Array of asinh(x exp(y)); intermediate values overflow or underflow only if x exp(y) does."""
     size, half = np.abs(x), np.exp(np.minimum(0.5 * y, 700.0))  # exp overflows beyond 709
-    with np.errstate(over="ignore"):  # then the logarithm is taken
+    with np.errstate(over="ignore"):  # where the product overflows, the logarithm below is used
         product = size * half * half  # two factors of e^(y/2), so that none overflows or vanishes unless x e^y does
-    # asinh(z) = log(2 z) to rounding for z > 1e8; above 1e150 its logarithm is used, as the product may overflow
+    # asinh(z) = log(2 z) to rounding for z > 1e8; used above 1e150, as log(2) + log|x| + y, since z may overflow
     return np.sign(x) * np.where(product > 1e150, np.log(size) + y + np.log(2.0), np.arcsinh(product))
 
 
@@ -115,7 +115,7 @@ FEW = 8
 
 
 def _of_numbers(function: Callable[..., Any]) -> Callable[..., float]:
-    """A NumPy function of floats, so that results agree bit for bit with those of arrays; raises on inf and NaN."""
+    """NumPy function for floats, bit for bit equal to its array results; raises ArithmeticError on inf and NaN."""
 
     def own(*values: float) -> float:
         found = float(function(*values))
@@ -148,7 +148,7 @@ _PRECISE: dict[str, Any] = {
 
 
 def occurrences(expressions: Iterable[sp.Basic]) -> dict[sp.Basic, int]:
-    """Number of uses of each subexpression if every subexpression is computed once."""
+    """Number of uses of each subexpression if each is computed only once."""
     found: dict[sp.Basic, int] = {}
     waiting = list(expressions)
     while waiting:
@@ -160,12 +160,12 @@ def occurrences(expressions: Iterable[sp.Basic]) -> dict[sp.Basic, int]:
 
 
 def supported(e: Any, what: str) -> sp.Expr:
-    """An expression that a law gives, as SymPy's, if values and slopes of all its functions can be computed.
+    """SymPy expression of a law without Max and Min, after a check that all its functions can be computed.
 
     Raises
     ------
     NotAvailable
-        With `what` it is, such as "strength of MyLaw".
+        If a function or number cannot be computed; the message contains `what`, such as "strength of MyLaw".
     """
     found = sp.sympify(e)
     if found.has(sp.Max, sp.Min):
@@ -182,7 +182,7 @@ def supported(e: Any, what: str) -> sp.Expr:
 
 
 class _Text:
-    """Writes expressions as lines of Python source; common subexpressions become assignments ``t0 = ...``."""
+    """Python source of expressions: `lines` assign common subexpressions to t0, t1, ...; `results` are expressions."""
 
     def __init__(
         self, names: Mapping[sp.Symbol, str], expressions: Sequence[sp.Basic], number: Callable[[Any], str]
@@ -232,7 +232,7 @@ class _Text:
         if isinstance(e, sp.ITE):
             return f"where({', '.join(parts)})"
         if e.func not in _NUMPY:
-            raise NotAvailable(f"the equations contain {e.func.__name__}(...), which has no counterpart for arrays")
+            raise NotAvailable(f"the equations contain {e.func.__name__}(...), which NumPy does not have")
         while e.func in (sp.Max, sp.Min) and len(parts) > 2:
             parts = [f"{_NUMPY[e.func]}({parts[0]}, {parts[1]})", *parts[2:]]
         return f"{_NUMPY[e.func]}({', '.join(parts)})"
@@ -295,7 +295,7 @@ class ArrayFunction:
     Raises
     ------
     NotAvailable
-        If an expression has a function in it that NumPy does not have.
+        If an expression contains a function that NumPy does not have.
     """
 
     def __init__(self, arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> None:
@@ -315,7 +315,7 @@ class ArrayFunction:
             try:
                 with np.errstate(all="ignore"):
                     return np.array([self._numbers(*row) for row in arguments.tolist()], dtype=float)
-            except (ArithmeticError, ValueError, TypeError):  # a value is inf, NaN or complex: NumPy represents it
+            except (ArithmeticError, ValueError, TypeError):  # a value is inf, NaN or complex: use NumPy below
                 pass
         found = self(*arguments.T)
         table = np.empty((len(arguments), len(found)))
@@ -337,7 +337,7 @@ class PreciseFunction:
     Raises
     ------
     NotAvailable
-        If an expression has a function in it that NumPy does not have.
+        If an expression contains a function that NumPy does not have.
     """
 
     def __init__(self, arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> None:

@@ -1,4 +1,4 @@
-"""Formatting of quantities for people: units with suitable prefixes or the user's own, few digits."""
+"""Formatting of quantities as text: suitable SI prefixes or the units of the user's file, few digits."""
 
 from __future__ import annotations
 
@@ -8,35 +8,34 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
-from steadyslip.core.areas import outside, told_area
+from steadyslip.core.areas import display_area, outside
 from steadyslip.core.dimensions import PLAIN_WORDS, PREFIXABLE, Dimension, factors, unit
 from steadyslip.core.written import display_as, display_names
 from steadyslip.units import day, hour, year
 
 _PER_LOAD = {unit(name)[1]: force for name, force in (("1/m", "N/um"), ("s/m", "N s/mm"))}
-"""Units of the force of bristles and of viscous friction, by the dimension that they have per load."""
+"""Customary units of bristle stiffness and viscous friction as forces, by the dimension of the parameter per load."""
 
 
 _SPEED, _ANGLE, _TURNING = (unit(name)[1] for name in ("m/s", "rad", "rad/s"))
 _PLAIN_FORCE = re.compile(r"(?:N|Pa)(?![A-Za-z])")
-"""Unit of a force, stress or what is in proportion to one, without a prefix."""
+"""Matches units that begin with N or Pa without a prefix, such as N/m."""
 _EXPONENT = re.compile(r"(?<![\w./=-])(−?-?\d(?:\.\d+)?)e([+-]\d+)(?![\w/-]|\.\w)")
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _FINE = ("arcsec", "arcmin")
-"""Parts of a degree: whoever writes one has the others told in it too."""
+"""Parts of a degree: a file that uses one for angles gets angular speeds in it too, and the reverse."""
 
 
 @lru_cache(maxsize=256)
 def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
-    """Units of a context by dimension, where one of them differs from the default by more than a leading prefix.
+    """Display units among `names` by dimension, where a unit differs from the default by more than a leading prefix.
 
-    Speeds and all that turns are told with the prefixes of the context as well, and angles in what its speeds of
-    turning have, or these in what its angles have. Forces and stresses that it has in N or Pa alone, without a prefix,
-    are told so too.
+    Also included: speeds and angular quantities with any prefix; forces and stresses if all of them are in plain N or
+    Pa. Angles get the arcsec or arcmin of angular speeds and the reverse.
     """
     found = {kind: set(several) for kind, several in _by_dimension(names).items()}
     loads = {name.partition(" at ")[2] for name in names if " at " in name}
-    for kind, si in _PER_LOAD.items():  # what is told at a load is so throughout
+    for kind, si in _PER_LOAD.items():  # if one parameter is printed at a load, all friction per load is
         if loads and not any(" at " in name for name in found.get(kind, ())):
             of_forces = found.get(unit(si)[1]) or {si}
             found[kind] = {f"{one} at {load}" for load in loads for one in of_forces}
@@ -62,7 +61,7 @@ def _by_dimension(names: frozenset[str]) -> dict[Dimension, set[str]]:
 
 
 def units_for(si_unit: str, names: frozenset[str]) -> tuple[str, ...]:
-    """Units of a context in which a quantity of an SI unit is told; frequencies not in those of rates, such as of Kv.
+    """Display units among `names` for a quantity in an SI unit; frequencies do not get units of gains, such as 1/min.
 
     >>> units_for("1/s", frozenset({"1/min"})), units_for("Hz", frozenset({"1/min"}))
     (('1/min',), ())
@@ -80,7 +79,10 @@ def _is_own(name: str) -> bool:
 
 
 def _at_one_load(names: tuple[str, ...], load: float | None) -> tuple[str, ...]:
-    """Those units at a load (N), made where none is: at the largest for None, none for 0; all where none is at one."""
+    """Units at one `load` (N) among units such as ``N/um at 3 kN``; all `names` if they are not at a load.
+
+    A unit for the load is made if it is missing. None stands for the largest load; 0 gives an empty tuple.
+    """
     if not names or " at " not in names[0]:
         return names
     sizes = {name: 1 / unit(f"1 at {name.partition(' at ')[2]}")[0] for name in names}
@@ -92,9 +94,9 @@ def _at_one_load(names: tuple[str, ...], load: float | None) -> tuple[str, ...]:
 
 
 def _named_unit(value: float, si_unit: str) -> str:
-    """Unit in which the file writes the parameter of the context; empty if it has none, or a value is too long in it.
+    """Unit of the context's parameter in its file; empty if unknown, or if the number would be too long in it.
 
-    Where scale is no matter, as with 1/m, no value is. Friction that is written per load is told as that of the file.
+    Units that take no prefix, such as 1/m, are never too long. Friction per load needs a unit at a load.
     """
     name, kind = display_as().unit, unit(si_unit)[1]
     if not name or unit(name)[1] != kind or (kind in _PER_LOAD and " at " not in name):
@@ -105,21 +107,21 @@ def _named_unit(value: float, si_unit: str) -> str:
 
 
 def _best(value: float, names: tuple[str, ...]) -> str | None:
-    """The one of several units in which an SI value is closest to 10 on a log scale; None for 0 or no units."""
+    """Unit among `names` in which an SI value is closest to 10 on a log scale; None for the value 0 or no names."""
     return min(names, key=lambda name: abs(math.log10(abs(value) / unit(name)[0]) - 1), default=None) if value else None
 
 
 _SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # takes a prefix; not m^2 (it would scale m), nor s/m (ms/m misleads)
 _SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
-HIDDEN = 1e-3  # share of its error below which a value is told as 0: no digit of it is known
-MOST_DIGITS = 12  # of the ends of a narrow range; beyond, digits are rounding errors
+HIDDEN = 1e-3  # a value below this share of its error is printed as 0: none of its digits is known
+MOST_DIGITS = 12  # of the ends of a narrow range; further digits are rounding errors
 SAME_LOAD = 1e-9  # relative difference of loads that are the same but for rounding of their units
-_SHORTEST, _LONGEST = 1e-3, 1e5  # numbers between are written without exponent; others in the SI unit without prefix
-_LONG = 1e4  # from which a number takes another prefix than that of the file
+_SHORTEST, _LONGEST = 1e-3, 1e5  # numbers in this range need no exponent; others are in the SI unit without prefix
+_LONG = 1e4  # from this number on, a suitable prefix is chosen in place of the prefix in the file
 
 
 def _turned(value: float, name: str) -> str:
-    """Unit of an angle or speed of turning: arcsec where a degree is too large, deg where an arcsecond is too small."""
+    """Unit of an angle or angular speed: `name`, with deg changed to arcsec for small SI values, and back for large."""
     part, _, rest = name.partition("/")
     size = abs(value) / unit(name)[0]
     if part == "deg" and 0 < size < _SHORTEST:
@@ -136,7 +138,7 @@ def _few(value: float, digits: int) -> str:
 
 
 def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
-    """Format an SI value: prefixed unit, few digits, angles in degrees, leads per turn, totals if there is an `area`.
+    """Text of an SI value with a prefixed unit; angles in degrees, screw leads per turn, totals if `area` (m²) is set.
 
     >>> format_quantity(8.72093e9, "Pa/m"), format_quantity(-0.7853981633974483, "rad"), format_quantity(0.0145, "1")
     ('8.721 GPa/m', '-45 deg', '0.0145')
@@ -145,7 +147,7 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
     >>> format_quantity(8.72093e9, "Pa/m", area=0.01)
     '87.21 MN/m'
     """
-    factor, si_unit = outside(si_unit, told_area(si_unit, area))
+    factor, si_unit = outside(si_unit, display_area(si_unit, area))
     value = value * factor
     if si_unit == "1":
         return _few(value, digits)
@@ -179,12 +181,12 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
 
 
 def format_like(value: float, like: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
-    """Format a value in the unit in which another value of the same quantity is told, unless it is too long in that.
+    """Text of an SI value in the unit in which `like` is printed, unless the number would be too long.
 
     >>> format_like(800.0, 28e3, "N"), format_like(2.0, 28e3, "N"), format_like(0.0, 28e3, "N")
     ('0.8 kN', '0.002 kN', '0 kN')
     """
-    factor, si_unit = outside(si_unit, told_area(si_unit, area))
+    factor, si_unit = outside(si_unit, display_area(si_unit, area))
     name = written_unit(like * factor, si_unit) or format_quantity(like * factor, si_unit).partition(" ")[2]
     size = unit(name)[0] if name and like and math.isfinite(like) else 0.0
     if size and (value == 0 or 0.1 * _SHORTEST <= abs(value * factor / size) < _LONGEST):
@@ -193,9 +195,9 @@ def format_like(value: float, like: float, si_unit: str, digits: int = 4, area: 
 
 
 def written_unit(value: float, si_unit: str) -> str:
-    """Unit of the context in which an SI value was written: of several the one in which it is closest to 10.
+    """Display unit of the value's dimension in which the number is closest to 10, as the rig's file probably has it.
 
-    Empty where there is none of its dimension, or the value would be too long in it.
+    Empty if the context has no unit of the dimension, or the number would be too long in it.
 
     >>> from steadyslip.core.written import display_units
     >>> with display_units(["kN", "N m/rad", "N m/arcsec"]):
@@ -212,16 +214,16 @@ def written_unit(value: float, si_unit: str) -> str:
 
 
 def format_as_written(value: float, own: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
-    """Format a value of a parameter in the unit in which its `own` one was written, unless it is too long in that.
+    """Text of an SI value of a parameter in the unit in which the file has its present value `own` (SI).
 
-    Without such a unit in the context it is formatted by itself.
+    If that unit is not known, or the number would be too long in it, the same text as `format_quantity`.
 
     >>> from steadyslip.core.written import display_units
     >>> with display_units(["kN"]):
     ...     format_as_written(800.0, 3200.0, "N"), format_as_written(0.8, 3200.0, "N"), format_quantity(800.0, "N")
     ('0.8 kN', '800 mN', '800 N')
     """
-    factor, si_unit = outside(si_unit, told_area(si_unit, area))
+    factor, si_unit = outside(si_unit, display_area(si_unit, area))
     name = written_unit(own * factor, si_unit)
     longest = _LONGEST if name and _is_own(name) else _LONG
     number = value * factor / unit(name)[0] if name else math.inf
@@ -232,7 +234,7 @@ def format_as_written(value: float, own: float, si_unit: str, digits: int = 4, a
 
 
 def format_own(value: float, si_unit: str, area: float | None = None) -> str:
-    """Format a parameter's own value in the unit in which it was written; with six digits if four are not all of it.
+    """Text of a parameter's present SI value in the unit of the file, with four digits, or six if four round it.
 
     >>> format_own(2e5, "1/m"), format_own(316.228, "s/m")
     ('2e+05 1/m', '316.228 s/m')
@@ -242,7 +244,7 @@ def format_own(value: float, si_unit: str, area: float | None = None) -> str:
 
 
 def digits_apart(value: float, other: float) -> int:
-    """Digits with which two values read differently: four, or for close ones as many as it takes, up to twelve.
+    """Number of digits with which the texts of two values differ: four, or more for close values, up to twelve.
 
     >>> digits_apart(1.0, 1.5), digits_apart(1.0, 1.00002)
     (4, 6)
@@ -252,14 +254,14 @@ def digits_apart(value: float, other: float) -> int:
 
 
 def format_with_error(value: float, error: float, si_unit: str, area: float | None = None) -> str:
-    """Format a value and its error, both in the unit chosen for the value; that of the error where it hides the value.
+    """Text of an SI value ± its error, both in the unit chosen for the value; 0 ± error for a negligible value.
 
     >>> format_with_error(1.009e-5, 8.7e-7, "m"), format_with_error(0.00696, 0.00043, "1")
     ('10.09 ± 0.87 um', '0.00696 ± 0.00043')
     >>> format_with_error(7e-17, 350.0, "s/m"), format_with_error(1.2e-9, 3.5e-5, "m")
     ('0 ± 350 s/m', '0 ± 35 um')
     """
-    scale, si_unit = outside(si_unit, told_area(si_unit, area))
+    scale, si_unit = outside(si_unit, display_area(si_unit, area))
     value, error = value * scale, error * scale
     if abs(value) < HIDDEN * error < math.inf:
         return f"0 ± {format_quantity(error, si_unit, 2)}"
@@ -269,12 +271,12 @@ def format_with_error(value: float, error: float, si_unit: str, area: float | No
 
 
 def format_range(low: float, high: float, si_unit: str, area: float | None = None, digits: int = 4) -> str:
-    """Format a range, both values in the unit chosen for the second, with two digits of its width at least.
+    """Text of a range of SI values, both in the unit chosen for `high`, with at least two digits of the width.
 
     >>> format_range(8.52e-6, 1.195e-5, "m"), format_range(0.599974, 0.600023, "1")
     ('8.52 to 11.95 um', '0.599974 to 0.600023')
     """
-    factor, si_unit = outside(si_unit, told_area(si_unit, area))
+    factor, si_unit = outside(si_unit, display_area(si_unit, area))
     low, high = low * factor, high * factor
     if math.isfinite(low) and math.isfinite(high) and low != high:
         digits = max(digits, min(2 + math.floor(math.log10(max(abs(low), abs(high)) / abs(high - low))), MOST_DIGITS))
@@ -285,7 +287,7 @@ def format_range(low: float, high: float, si_unit: str, area: float | None = Non
 
 
 def enumerated(words: Sequence[str]) -> str:
-    """Words joined by commas and an and.
+    """Words joined by commas, the last two by "and".
 
     >>> enumerated(["a", "b", "k"])
     'a, b and k'
@@ -303,7 +305,7 @@ def format_growth(low: float, high: float | None = None) -> str:
 
 
 def format_count(number: int, word: str) -> str:
-    """A number with its word, which is plural but for one.
+    """Number and noun, with the noun in the plural except for 1.
 
     >>> format_count(1, "row"), format_count(3, "row")
     ('1 row', '3 rows')
@@ -322,12 +324,12 @@ def format_percent(share: float) -> str:
 
 
 def typeset_powers(text: str) -> str:
-    """Replace powers of ten in a text by typeset ones, such as 2 × 10⁵ for 2e+05."""
+    """Text with numbers such as 2e+05 replaced by 2 × 10⁵."""
     return _EXPONENT.sub(lambda found: f"{found[1]} × 10{str(int(found[2])).translate(_SUPERSCRIPTS)}", text)
 
 
 def typeset(text: str) -> str:
-    """Replace ASCII units and powers of ten in a text by typeset ones: µm, m², kg/m³, 2 × 10⁵.
+    """Text with ASCII units and powers of ten replaced by typographic ones: µm, m², kg/m³, 2 × 10⁵.
 
     >>> typeset("9.2 us, 3 um/s, 2 uN m at 5 m^2, 2e+05 1/m: ours")
     '9.2 µs, 3 µm/s, 2 µN m at 5 m², 2 × 10⁵ 1/m: ours'

@@ -12,19 +12,19 @@ _PLAIN_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
 def unfit_name(name: Any) -> str:
-    """Reason why a name cannot be used as a part of dotted names; empty if it can."""
+    """Message why a name cannot be a part of dotted names; empty if it can."""
     if isinstance(name, str) and _PLAIN_NAME.fullmatch(name) and len(name) <= 40:
         return ""
-    return "is no name; allowed: up to 40 letters from a to z, digits, hyphens and underscores, a letter first"
+    return "is not a valid name; allowed: up to 40 letters a to z, digits, hyphens and underscores, a letter first"
 
 
 def resolve(name: str, known: Mapping[str, Any]) -> str:
-    """Full dotted name of a parameter whose leading or middle parts may be left out if the rest is unique.
+    """Full dotted name for a `name` without its leading or middle parts, if the rest is unique among `known`.
 
     Raises
     ------
     UnknownNameError
-        If no parameter, or more than one, has that name.
+        If no parameter, or more than one, matches.
     """
     if not isinstance(name, str):
         raise UnknownNameError("parameter", name, known)
@@ -41,7 +41,7 @@ def resolve(name: str, known: Mapping[str, Any]) -> str:
 
 
 class Members(Mapping[str, Any]):
-    """Immutable, hashable mapping of user-given names to records, in order."""
+    """Immutable, hashable mapping of user-given names to records, in the order given."""
 
     def __init__(self, of: Mapping[str, Any] | None = None) -> None:
         self._of = dict(of or {})

@@ -19,8 +19,8 @@ from steadyslip.core.quantities import example, in_si
 from steadyslip.core.roles import Role, fault
 from steadyslip.core.written import in_written_units
 
-LARGEST = 1.7e308  # just below the largest float; Python integers may be larger
-MOST = 1e150  # its square is finite
+LARGEST = 1.7e308  # largest accepted number, just below the largest float; Python integers may be larger
+MOST = 1e150  # largest accepted size of array items, whose squares must be finite
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -62,7 +62,7 @@ def _is_number(value: Any) -> bool:
 
 
 def finite(above: float, most: float = math.inf, *, closed: bool = False, unit: str = "") -> Role:
-    """Role of finite numbers above a bound (from it on if `closed`) and up to `most`; with a unit also of texts."""
+    """Role of finite numbers > `above` (>= if `closed`) and <= `most`; texts with a unit too if `unit` is given."""
 
     def passes(value: Any) -> bool:
         above_low = _is_number(value) and (above < value or (closed and value == above))
@@ -124,7 +124,7 @@ def _is_list(value: Any) -> bool:
 
 
 def _several(each: Tested, words: str, *, alone: bool = True) -> Tested:
-    """Role of lists of values of a role, or one of these if `alone` is true; iterables other than lists pass unread."""
+    """Role of lists whose items have the role `each`; a single item too if `alone`. Other iterables are not checked."""
 
     def passes(value: Any) -> bool:
         if isinstance(value, (list, tuple)):
@@ -189,10 +189,10 @@ def role_of(name: str, annotation: str) -> Role | None:
 def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Decorator that checks the arguments of a function before it is called; default values always pass.
 
-    What the function tells about a rig is in the units of the rig's file.
+    Texts that the function makes about a rig have the units of the rig's file.
 
-    `roles` are needed where `role_of` cannot tell the role, such as the range of a number. Each of a variable number
-    of arguments (``*links``) is checked, and named in errors by its place: ``argument 2``.
+    `roles` are needed for arguments whose role `role_of` does not find, such as numbers with a range. Each item of a
+    variable number of arguments (``*links``) is checked, and named in errors by its position: ``argument 2``.
 
     Raises
     ------
@@ -200,8 +200,8 @@ def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
         From the decorated function, if a value is not allowed.
     """
 
-    def decorate(asked: Callable[P, R]) -> Callable[P, R]:
-        function = in_written_units(asked)
+    def decorate(decorated: Callable[P, R]) -> Callable[P, R]:
+        function = in_written_units(decorated)
         call: Callable[..., R] = function
         parameters = inspect.signature(function).parameters
         defaults = {name: item.default for name, item in parameters.items()}
@@ -220,7 +220,7 @@ def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
             values: dict[Any, Any] = dict(enumerate(args)) | kwargs
             given = [(i, name, name) for i, name in enumerate(single[: min(count, len(args))])]
             given += [(i, several or "", f"argument {i + 1}") for i in range(count, len(args))]
-            for key, name, shown in (*given, *((name, name, name) for name in kwargs)):
+            for key, name, label in (*given, *((name, name, name) for name in kwargs)):
                 if name not in known or values[key] is (default := defaults[name]):
                     continue
                 try:
@@ -228,7 +228,7 @@ def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
                     values[key] = found if isinstance(known[name], Measured) else values[key]
                 except ParameterError as error:
                     other = ", or None" if default is None else ""
-                    problems += [Problem(shown, fault.message + other) for fault in error.problems]
+                    problems += [Problem(label, fault.message + other) for fault in error.problems]
             if problems:
                 raise ParameterError(problems)
             positional = [values.pop(i) for i in range(len(args))]

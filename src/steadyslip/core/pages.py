@@ -43,7 +43,7 @@ def _made(kind: str) -> Maker:
         _sources[-1]()
         _sources.pop()
     if kind not in _makers:
-        raise NotAvailable("there are no pages here: the reports are not loaded")
+        raise NotAvailable("results have no HTML here: the reports are not loaded; import steadyslip as a whole")
     return _makers[kind]
 
 
@@ -51,14 +51,14 @@ class Displayed:
     """Base of objects that print themselves in the units of their rig's file, and that notebooks display as HTML."""
 
     written_in: ClassVar[tuple[str, ...]] = ()
-    """Units of the file that the rig was read from, in which it and its results are told; no part of their value."""
+    """Units of the rig's file, in which the rig and its results are printed; not compared by ==."""
 
     def __new__(cls, *_: Any, **__: Any) -> Self:
         made = super().__new__(cls)
-        return made.told_in(sorted(display_names())) if display_names() else made
+        return made.set_display_units(sorted(display_names())) if display_names() else made
 
-    def told_in(self, names: Iterable[str]) -> Self:
-        """The object itself, which is told in these units from now on."""
+    def set_display_units(self, names: Iterable[str]) -> Self:
+        """Set the units in which the object is printed from now on, and return the object itself."""
         object.__setattr__(self, "written_in", tuple(dict.fromkeys(names)))
         return self
 

@@ -1,7 +1,7 @@
 """Colours of page, figures and reports, declared once.
 
-Areas differ in grey as well: stable and unstable, and blow-up and both, by at least 25 in lightness L* (CIE 1976), so
-that a print without colour tells them apart. Pages get these values as variables of their style sheet.
+The areas for stable, unstable and blow-up differ by at least 25 in lightness L* (CIE 1976), so that they can be
+distinguished in a print without colour. Pages get these values as variables of their style sheet.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ GREY: Final = "#BBBBBB"
 STABLE: Final = "#C3E1F7"
 UNSTABLE: Final = "#D97F12"
 BLOW_UP: Final = "#84215F"
-ABSENT: Final = "#E4E0EA"  # no steady sliding; hatched besides
+ABSENT: Final = "#E4E0EA"  # no steady sliding; also hatched
 UNKNOWN: Final = "#8D949E"
 CURVES: Final = (BLUE, SKY, BLACK, ORANGE, VERMILION, GREEN, PURPLE)
 LINES: Final = ("-", "--", "-.", ":")
@@ -32,7 +32,7 @@ LIGHT: Final = {
     "bad": "#a83200", "stable": STABLE, "undamped": STABLE, "unstable": UNSTABLE, "blow-up": BLOW_UP, "none": ABSENT,
     "unknown": UNKNOWN,
 }  # fmt: skip
-"""Colours of a light page, of figures and of paper, by role."""
+"""Colours of a light page, of figures and of prints, by role."""
 DARK: Final = {
     "ink": "#e8ecf1", "soft": "#a9b4c2", "paper": "#12161c", "card": "#1a2028", "line": "#3a4452", "accent": "#6cc0f5",
     "bad": "#ff9a5c", "stable": "#5ba5d8", "undamped": "#5ba5d8", "unstable": "#8a4b00", "blow-up": "#f08cc4",
@@ -44,4 +44,4 @@ FORCED: Final = {
     "accent": "Highlight", "bad": "CanvasText", "stable": "Canvas", "undamped": "Canvas", "unstable": "CanvasText",
     "blow-up": "Highlight", "none": "Canvas", "unknown": "GrayText",
 }  # fmt: skip
-"""System colours by role, where the reader's system sets all colours."""
+"""System colours by role, used where the reader's system forces its own colours."""

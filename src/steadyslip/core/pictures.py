@@ -44,7 +44,7 @@ def saved_by(save: Callable[[Any, str, Any], object], column: Callable[[], Abstr
 
 @contextmanager
 def for_a_journal() -> Iterator[None]:
-    """Context in which figures that are made for a file are as wide as one column of a journal."""
+    """Context in which figures drawn for a file are as wide as one column of a journal."""
     before = _is_column.set(True)
     try:
         yield
@@ -53,7 +53,7 @@ def for_a_journal() -> Iterator[None]:
 
 
 def drawn_for_file(figure: Callable[[], Any]) -> Any:
-    """Axes that `figure` draws, in the width that files have in this context."""
+    """Axes returned by the drawing function `figure`, as wide as figures in files are in this context."""
     _load_figures()
     with _columns[-1]() if _is_column.get() else nullcontext():
         return figure()
@@ -61,7 +61,7 @@ def drawn_for_file(figure: Callable[[], Any]) -> Any:
 
 @in_written_units
 def save(axes: Any, path: str, result: Any) -> None:
-    """Save the figure of Axes, or of an array of them, with what it shows: the rig of the result, version and date."""
+    """Save the figure of Axes (or an array of them) to a file, with the result's rig, version and date in a footer."""
     _savers[-1](axes, path, result)
 
 

@@ -38,9 +38,9 @@ def progress_bar(
     wanted : bool, optional
         Switch on or off; by default on if stderr is a terminal.
     noun : str
-        Label of the items.
+        Plural noun for the items, shown before the bar.
     done : int
-        Number of items finished before; the rate does not count them.
+        Number of items finished before the start, not counted in the rate.
     """
     if wanted is False or (wanted is None and not sys.stderr.isatty()):
         yield None

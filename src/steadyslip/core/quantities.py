@@ -26,19 +26,20 @@ _BY_RADIUS = {
 }
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)(?![a-z])", re.I | re.A)
 PER_LOAD = ("1", "1/m", "s/m")
-"""Units of friction per load, which machine people know as forces: a coefficient, bristles, viscous friction."""
+"""SI units of friction per load (coefficient, bristle stiffness, viscous friction); data sheets give them as forces."""
 _OF_FORCES = {"1": "N", "1/m": "N/um", "s/m": "N s/mm"}
+"""Customary unit of the force, stiffness or damping by the unit of the parameter per load."""
 _COMMA = re.compile(r",(\d+)", re.A)
 _QUOTIENT = re.compile(r"/\s*(\d+\.?\d*)", re.A)
 _RATIO = re.compile(r":\s*(\d+\.?\d*)", re.A)
 _EXAMPLE = re.compile(r"(?<=['\"])[\d.eE+-]+(?= )")
-"""Number of an example in quotes."""
+"""Matches the number in a quoted example such as ``'5 MPa'``."""
 _BETWEEN_DIGITS = re.compile(r"(?<=\d),(?=\d)", re.A)
 _NONZERO = re.compile(r"[^eE]*[1-9]")
 
 
 def decimal_comma(text: str) -> QuantityError:
-    """Error for a text in which numbers have decimal commas, with the text as it is to be written."""
+    """QuantityError for a text with decimal commas; its message has the text with points instead."""
     return QuantityError(f"{text!r} has a decimal comma: write {_BETWEEN_DIGITS.sub('.', text)}")
 
 
@@ -52,7 +53,7 @@ def parse(text: str, expected: str, instance: str = "") -> float:
     expected : str
         SI unit of the parameter; only its dimension matters.
     instance : str, optional
-        Typical value with its unit, for messages; that of the SI unit by default.
+        Typical value with its unit, for messages; by default an example for the SI unit.
 
     Returns
     -------
@@ -77,7 +78,7 @@ def parse(text: str, expected: str, instance: str = "") -> float:
     if divisor and wanted == Dimension() and float(divisor[1]) > 0:  # a gear ratio, 1/360
         return _scaled(digits, 1 / float(divisor[1]))
     if ratio := _RATIO.fullmatch(name) if wanted == Dimension() else None:
-        message = f'{text!r} may be read both ways; write "{digits}/{ratio[1]}" or "{ratio[1]}/{digits}"'
+        message = f'{text!r} is a ratio of unknown direction; write "{digits}/{ratio[1]}" or "{ratio[1]}/{digits}"'
         raise QuantityError(message)
     if not name:
         if wanted != Dimension():
@@ -123,7 +124,7 @@ def parse(text: str, expected: str, instance: str = "") -> float:
 
 
 def _of_what_turns(found: Dimension, wanted: Dimension) -> str:
-    """Hint where a torque, angle or angular speed came for a force, path or speed; empty otherwise."""
+    """Hint for a torque, angle or angular speed in place of a force, length or speed; empty for other dimensions."""
     torque = (found, wanted) == (_WEIGHT.times(AREA, 0.5), _WEIGHT)
     step = "divide by the radius" if torque else _BY_RADIUS.get(found.times(wanted, -1), "")
     return f"; that is of something that turns: at a radius, {step}" if step else ""
@@ -143,12 +144,12 @@ def _scaled(digits: str, factor: float) -> float:
 
 
 def in_si(value: Any, expected: str) -> Any:
-    """Convert text with a unit, or a column in which there is some, to SI numbers; other values are returned unchanged.
+    """Convert text with a unit, or a list that contains text, to SI numbers; other values are returned unchanged.
 
     Raises
     ------
     QuantityError
-        If text is no quantity of the dimension of `expected`, an SI unit.
+        If a text is not a quantity with the dimension of the SI unit `expected`.
     """
     if isinstance(value, str):
         return parse(value, expected)
@@ -157,7 +158,7 @@ def in_si(value: Any, expected: str) -> Any:
 
 
 def column_with_text(value: Any) -> Sequence[Any] | None:
-    """Items of a list, tuple or array in which some are text; None for anything else."""
+    """Items of a list, tuple or array that contains text; None for anything else."""
     items = value.tolist() if isinstance(value, np.ndarray) and value.dtype.kind in "UO" else value
     has_text = isinstance(items, (list, tuple)) and any(isinstance(item, str) for item in items)
     return items if has_text else None
@@ -183,7 +184,7 @@ def numbers(values: Any, expected: str, read: Callable[[str, str], float] = pars
     Raises
     ------
     QuantityError
-        If it is no such column; the message has position (from 1) and value of the first fault.
+        If `values` is not a list of finite quantities; the message has position (from 1) and value of the first fault.
     """
     if isinstance(values, np.ndarray) and values.ndim == 1:
         values = values.tolist()
@@ -238,24 +239,25 @@ _EXAMPLES = {
 
 
 def units_in(values: Any) -> set[str]:
-    """Units of the quantities among texts, also inside lists and tables; beside them that of an area without one."""
+    """Units in the texts of a value, also inside lists and dicts; ``m^2`` too for an ``area`` that is a number."""
     found, areas, left = set(), set(), [values]
     while left:
         one = left.pop()
         if isinstance(one, (dict, list, tuple, set)):
             left += one.values() if isinstance(one, dict) else one
             if isinstance(one, dict) and isinstance(one.get("area"), (int, float)):
-                areas.add("m^2")  # so that an area is known to be of this file
+                areas.add("m^2")  # areas.display_area looks for a unit of area to see that the file itself has one
         elif isinstance(one, str) and len(one) <= MOST_TEXT and (match := _NUMBER.match(one.strip())):
             found.add(one.strip()[match.end() :].strip())
     found = {name for name in found if name and _is_unit(name)}
     return found | areas if found else found
 
 
-def units_told(tables: Mapping[str, Any]) -> set[str]:
-    """Units in which a rig file's results are told: those of its quantities, but of speeds that of its drive alone.
+def result_units(tables: Mapping[str, Any]) -> set[str]:
+    """Units in which a rig's results are printed: all units of its file, but for speeds only the unit of the drive.
 
-    >>> sorted(units_told({"drive": {"velocity": "0.8 mm/s"}, "friction": {"v_stribeck": "60 mm/min", "d_c": "2 um"}}))
+    >>> drive, friction = {"velocity": "0.8 mm/s"}, {"v_stribeck": "60 mm/min", "d_c": "2 um"}
+    >>> sorted(result_units({"drive": drive, "friction": friction}))
     ['mm/s', 'um']
     """
     found, drive = units_in(tables), tables.get("drive")
@@ -265,7 +267,7 @@ def units_told(tables: Mapping[str, Any]) -> set[str]:
 
 
 def units_named(values: Mapping[str, Any]) -> dict[str, str]:
-    """Units of the quantities among texts, by the keys of those that have one.
+    """Unit of each value that is text with a unit, by its key; other values are left out.
 
     >>> units_named({"bristles": "800 N/um at 6 kN", "viscous": 0.5})
     {'bristles': 'N/um at 6 kN'}
@@ -282,12 +284,12 @@ def _is_unit(name: str) -> bool:
 
 
 def example(expected: str) -> str:
-    """A quoted example of a quantity with this unit, for messages."""
+    """Quoted example of a quantity with this SI unit, for messages."""
     if expected == "1":
         return "0.5"
     return repr(_EXAMPLES.get(expected, f"1 {expected}"))
 
 
 def described(expected: str) -> str:
-    """Description of a quantity with this unit, for messages."""
+    """Description of a quantity with this SI unit, for messages, such as "a quantity in Pa"."""
     return "a number without unit" if expected == "1" else f"a quantity in {expected}"

@@ -27,10 +27,10 @@ from steadyslip.core.roles import Entry, Parameter, Role, Series, Total, fault
 
 @dataclass(frozen=True)
 class Part(Role):
-    """Role of a field that holds another record; with ``inline`` its parameters are addressed like the owner's own.
+    """Role of a field that holds another record; with ``inline`` its parameters have dotted names like the owner's own.
 
     With ``many`` it holds a tuple of records: in files a list of tables, or with ``by_name`` tables named after their
-    laws. With ``keyed`` it holds `Members`: a table of tables, each under a user-given name.
+    laws. With ``keyed`` it holds `Members`: in files a table of tables, each under a user-given name.
     """
 
     family: type[FrozenRecord]
@@ -94,7 +94,7 @@ class Named(Role):
 
 
 Declared = Entry | Part | Named
-"""Types of declarations of record fields."""
+"""Types of roles with which record fields are declared."""
 _ROLE, _KEY = "steadyslip", "key"
 R = TypeVar("R", bound="FrozenRecord")
 
@@ -131,7 +131,7 @@ def parameter(
 
 
 def option(*choices: Any, doc: str, default: Any) -> Any:
-    """Declare a field with one of several words, or a bool.
+    """Declare a field whose value is one of the `choices`: words, or a bool.
 
     Examples
     --------
@@ -142,7 +142,7 @@ def option(*choices: Any, doc: str, default: Any) -> Any:
 
 
 def samples(unit: str, doc: str) -> Any:
-    """Declare a field with a measured column: a list or array of numbers, or of texts with units.
+    """Declare a field for a measured column: a list or array of numbers, or of texts with units.
 
     Examples
     --------
@@ -209,7 +209,7 @@ class FrozenRecord(Displayed):
     family: ClassVar[str] = ""
     section: ClassVar[str] = ""
     short: ClassVar[tuple[str, ...]] = ()
-    """Keys of the record's table that may be written as a single value, or as a list in this order."""
+    """Fields that may replace the record's table in files: one value for the first, or a list in this order."""
     registry: ClassVar[dict[str, type[FrozenRecord]]] = {}
     chosen_by: ClassVar[tuple[str, str | None]] = ("law", None)
     """Key of the family's tables that names the law, and the default law if it is absent."""
@@ -253,7 +253,7 @@ class FrozenRecord(Displayed):
             raise ParameterError(problems, title=type(self).__name__)
 
     def _settled(self) -> Iterator[Problem]:
-        """Convert totals (N, N/m, ...) of a contact to values per unit area; yield a Problem for each without area."""
+        """Convert totals (N, N/m, ...) to values per unit area; yield a Problem for each total if there is no area."""
         if not self.has_area:
             return
         totals = {name: found for name, found in parameters(self).items() if isinstance(found.value, Total)}
@@ -262,7 +262,7 @@ class FrozenRecord(Displayed):
             if area is None:
                 unit, got = address.role.unit, f"got {address.value:g} {total_unit(address.role.unit)}"
                 hint = f"give the contact's area, such as area = '0.01 m^2', or a quantity in {unit}"
-                yield Problem(name, f"{got}, a total, and this is per unit area; {hint}")
+                yield Problem(name, f"{got}, the total of a contact; this parameter is per unit area; {hint}")
         if totals and area is not None:
             other = replaced(self, {name: float(address.value or 0.0) / area for name, address in totals.items()})
             for item in fields(self):  # type: ignore[arg-type]
@@ -273,7 +273,7 @@ class FrozenRecord(Displayed):
         yield from ()
 
     def conditions(self) -> Iterator[Condition]:
-        """Yield the conditions between several parameters, for numbers or for arrays in a copy by `with_values`."""
+        """Yield the conditions between several parameters; fields may be numbers, or arrays set by `with_values`."""
         yield from ()
 
     def __repr__(self) -> str:
@@ -286,7 +286,7 @@ class FrozenRecord(Displayed):
 
 
 def _check_fields(cls: type[FrozenRecord]) -> None:
-    """Raise TypeError if a field hides a method or attribute of its bases, or has the name of the law key."""
+    """Raise TypeError if a field is named like a method or attribute of a base, or like the law's key in files."""
     known = {name for base in cls.__mro__[1:] for name in getattr(base, "__dataclass_fields__", ())}
     own = [name for name in vars(cls).get("__annotations__", ()) if isinstance(vars(cls).get(name), Field)]
     for name in own:
@@ -300,22 +300,22 @@ def _check_fields(cls: type[FrozenRecord]) -> None:
 
 
 class Settings(FrozenRecord):
-    """Base of tables about tasks ([map], [fit], ...); valid entries of a faulty one serve to check further tables."""
+    """Base of file tables about tasks ([map], [fit], ...); valid entries of a faulty table help check other tables."""
 
 
 def key_of(item: Field[Any]) -> str:
-    """Key of a field in files."""
+    """Key of a dataclass field in files: its name, unless another key was declared."""
     return item.metadata.get(_KEY) or item.name
 
 
 def given(record: FrozenRecord) -> dict[str, Any]:
-    """Fields of a record that differ from their default, by name."""
+    """Values of a record's fields that differ from the default, by field name."""
     found = {item.name: getattr(record, item.name) for item in fields(record)}  # type: ignore[arg-type]
     return {item.name: found[item.name] for item in fields(record) if found[item.name] != item.default}  # type: ignore[arg-type]
 
 
 def role_of(item: Field[Any]) -> Declared:
-    """Role with which a dataclass field was declared."""
+    """Role with which a dataclass field was declared; TypeError if it has none."""
     role: Declared | None = item.metadata.get(_ROLE)
     if role is None:
         raise TypeError(f"field {item.name!r} has no unit or domain; declare it with parameter(), option() or part()")
@@ -323,7 +323,7 @@ def role_of(item: Field[Any]) -> Declared:
 
 
 def stand_in(law: type[R]) -> R | None:
-    """Record made of the `standing` values of its parameters; None if another required field has neither."""
+    """Record of a law with the `standing` values of its parameters; None if a required field has no standing value."""
     standing = {item.name: getattr(role_of(item), "standing", None) for item in fields(law)}  # type: ignore[arg-type]
     own = {name: value for name, value in standing.items() if value is not None}
     lacking = [item for item in fields(law) if is_required(item) and item.name not in own]  # type: ignore[arg-type]
@@ -356,7 +356,7 @@ def checked(item: Field[Any], value: Any) -> Any:
 
 
 def below(role: Part, value: Any, name: str, prefix: str) -> Iterator[tuple[str, FrozenRecord]]:
-    """Yield the records in a field, each with the prefix of its parameters' dotted names."""
+    """Yield the records that a field holds, each after the prefix of its parameters' dotted names."""
     if role.many:
         yield from ((f"{name}.{index}.", member) for index, member in enumerate(value, start=1))
     elif role.keyed:
@@ -366,7 +366,7 @@ def below(role: Part, value: Any, name: str, prefix: str) -> Iterator[tuple[str,
 
 
 def records_in(record: FrozenRecord) -> Iterator[FrozenRecord]:
-    """Yield the records in the fields of a record, each followed by those in its own fields."""
+    """Yield all records inside a record, depth first."""
     for name, own, role in field_layout(record):
         if isinstance(role, Part):
             for _, member in below(role, getattr(record, name), own, ""):
@@ -375,7 +375,7 @@ def records_in(record: FrozenRecord) -> Iterator[FrozenRecord]:
 
 
 def _each(role: Part, value: Any, name: str, prefix: str, change: Callable[[Any, str], Any]) -> Any:
-    """Value of a field with ``change(record, prefix)`` applied to every record in it."""
+    """Copy of a field's value with every record in it replaced by ``change(record, prefix)``."""
     changed = [change(member, before) for before, member in below(role, value, name, prefix)]
     if role.many:
         return tuple(changed)
@@ -413,7 +413,7 @@ def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
 
 
 def choices(record: FrozenRecord, prefix: str = "") -> dict[str, tuple[Option, Any, bool]]:
-    """Choices of a record and the records in it by dotted name: what may be chosen, what is, and whether by default."""
+    """Options of a record and of the records in it by dotted name: role, present value, True if that is the default."""
     found: dict[str, tuple[Option, Any, bool]] = {}
     usual = {item.name: item.default for item in fields(record)}  # type: ignore[arg-type]
     for field_name, own_name, role in field_layout(record):
@@ -468,7 +468,7 @@ def with_values(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
 
 
 def shape_of(record: FrozenRecord, prefix: str = "") -> tuple[Any, ...]:
-    """Hashable structure of a record without its numbers: types, options, which parameters are given or zero."""
+    """Hashable structure of a record without its numbers: types, options, and which parameters are None or zero."""
     shape: list[Any] = [type(record)]
     for field_name, _, role in field_layout(record):
         value = getattr(record, field_name)

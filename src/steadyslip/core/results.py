@@ -22,7 +22,7 @@ class ReadOnly(Displayed):
 
 
 def read_only(value: Any) -> Any:
-    """Replace arrays by read-only views, also inside tuples and dictionaries; other values are returned unchanged."""
+    """Read-only view of an array, or copy of a tuple or dict with such views; any other value unchanged."""
     if type(value) is np.ndarray:
         view = value.view()
         view.setflags(write=False)

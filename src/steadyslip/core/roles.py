@@ -25,7 +25,7 @@ Schema = dict[str, Any]
 
 
 class Role:
-    """Base of types of fields and arguments."""
+    """Base of the types of record fields and function arguments."""
 
     def checked(self, value: Any) -> Any:
         """Check a value and convert it to the form that is stored.
@@ -33,7 +33,7 @@ class Role:
         Raises
         ------
         ParameterError
-            Naming no field, only the fault.
+            If the value is not allowed; the caller adds the name of the field.
         """
         raise NotImplementedError
 
@@ -42,24 +42,24 @@ class Role:
         raise NotImplementedError
 
     def refused(self, value: Any) -> ParameterError:
-        """Make the exception for a value that is not allowed."""
+        """ParameterError for a value that is not allowed."""
         return fault(f"got {repr_short(value)}; allowed: {self.allowed()}")
 
 
 class Placeholder(float):
-    """A number that stands for one nobody has given: fits take the value from records, or ask for it.
+    """Provisional number for a parameter that the user has left out: fits take its value from records, or demand it.
 
-    Any other value put in its place is a plain float.
+    A value that replaces it is a plain float.
     """
 
 
 def fault(message: str) -> ParameterError:
-    """Make a ParameterError that does not name a field yet."""
+    """ParameterError with a message; the caller adds the name of the field."""
     return ParameterError([Problem("", message)])
 
 
 class Entry(Role):
-    """Base of roles that occur in file tables; subclasses are dataclasses whose `doc` describes the entry."""
+    """Base of roles of entries in file tables; subclasses are dataclasses whose `doc` describes the entry."""
 
     doc: str
 
@@ -68,12 +68,12 @@ class Entry(Role):
         raise NotImplementedError
 
     def read(self, raw: Any, area: float | None) -> Any:
-        """Convert a raw value of a file; if the rig has an area (m²), per-area quantities are given as totals.
+        """Convert a raw value of a file to the stored form; if the rig has an area (m²), the file has totals.
 
         Raises
         ------
         ParameterError
-            Naming no field, only the fault.
+            If the value is not allowed; the caller adds the name of the field.
         """
         return self.checked(raw)
 
@@ -100,7 +100,7 @@ PARAMETER_KINDS = {
     "stiffness": "of the spring, or of what acts as one",
     "delay": "time by which something acts late",
 }
-"""Physical meanings by which stages find parameters, since names are free."""
+"""Physical meanings of parameters (`Parameter.kind`), by which other code finds them, since laws choose the names."""
 
 
 class Total(float):
@@ -108,18 +108,18 @@ class Total(float):
 
 
 class InUnit(float):
-    """SI number from text like ``"0.05 rpm"`` whose `unit` only some rigs allow, before the rig is known."""
+    """SI number from text like ``"0.05 rpm"``; whether its `unit` is allowed is checked once the rig is known."""
 
     unit: str
 
     def __new__(cls, number: float, unit: str) -> InUnit:
-        """Make a float with a unit."""
+        """Float with the attribute `unit`."""
         found = super().__new__(cls, number)
         found.unit = unit
         return found
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle with the unit."""
+        """Arguments for pickling, with the unit."""
         return InUnit, (float(self), self.unit)
 
 
@@ -127,7 +127,7 @@ _HINTS = re.compile(
     "^at velocity 0: |; (?:0 (?:to|is) |needs |without |[^;]* unless given).*$|, (?:instead|to report ).*$"
     "|, such as '[^']*'"
 )
-"""Parts of a description that are for who writes a file."""
+"""Matches the parts of a description that are hints for writing a file."""
 
 
 @dataclass(frozen=True)
@@ -149,22 +149,22 @@ class Parameter(Entry):
     gauge : bool
         Changes no observable result (a reference that only shifts a state), so it has no stability edge.
     kind : str
-        Physical meaning for scaling and fitting without knowledge of the law: one of `PARAMETER_KINDS`, or empty.
+        Physical meaning for scaling and fitting without knowledge of the law: a key of `PARAMETER_KINDS`, or empty.
     size : float or None
-        Typical change of a parameter that may be zero or negative; for positive ones their value is used.
+        Typical change of a parameter that may be zero or negative; of positive parameters it is the value itself.
     letter : str
         Symbol in equations; the name by default.
     standing : float or None
         Value used while the parameter is still to be fitted.
     idle : float or None
-        Value at which the parameter has no effect, together with the others of its list member; the law without that
-        member is a simpler one.
+        Value at which a member of a list of records has no effect if all its parameters have their `idle` value; the
+        law without that member is a simpler law.
     elsewhere : tuple of str
         SI units of the parameter for other kinds of rig: forces, angles.
     instance : str
-        Typical value with its unit, for messages, such as ``2 ms``; that of its SI unit by default.
+        Typical value with its unit, for messages, such as ``2 ms``; by default an example for the SI unit.
     optional : bool
-        The field may be left out, which messages on a zero say.
+        The field may be left out; the message for a forbidden zero recommends it.
     """
 
     unit: str
@@ -184,12 +184,12 @@ class Parameter(Entry):
 
     @property
     def meaning(self) -> str:
-        """`doc` without the hints for who writes a file: what to give instead, or what stands for nothing given."""
+        """`doc` without its hints for writing a file, such as alternatives and defaults."""
         return _HINTS.sub("", self.doc)
 
     @property
     def unless_given(self) -> str:
-        """What stands for nothing given, by `doc`, such as ``2`` or ``infinite``; empty if nothing does."""
+        """Default that `doc` states, such as ``2`` or ``infinite``; empty if it states none."""
         found = re.search(r"; ([^;]+) unless given", self.doc)
         return found[1] if found else ""
 
@@ -220,13 +220,13 @@ class Parameter(Entry):
                 meant = f"; write '{number:g} %'" if bare else percent
                 raise fault(f"got {repr_short(value)}; allowed: {self.allowed()}{meant}")
             if self.optional and number == 0:
-                raise fault(f"got {repr_short(value)}; allowed: {self.allowed()}; for none leave it out")
+                raise fault(f"got {repr_short(value)}; allowed: {self.allowed()}; or leave it out")
             raise self.refused(value)
         # + 0.0 turns -0.0 into 0.0, which equals the default when files are written
         return value if isinstance(value, Placeholder) else number + 0.0
 
     def given(self, value: Any) -> float:
-        """Check a constructor argument; text in a unit that depends on the rig becomes a `Total` or `InUnit`."""
+        """Check a constructor argument; text whose unit only some rigs allow becomes a `Total` or an `InUnit`."""
         if isinstance(value, (Total, InUnit)):
             return value
         try:
@@ -242,7 +242,7 @@ class Parameter(Entry):
             raise
 
     def shown_instance(self) -> str:
-        """A quoted example of a value, for messages."""
+        """Quoted example of a value, for messages."""
         return repr(self.instance) if self.instance else example(self.unit)
 
     def allowed(self) -> str:
@@ -271,7 +271,7 @@ class Parameter(Entry):
             except QuantityError as error:
                 raise fault(str(error)) from error
             if math.isfinite(value * area):
-                whole.checked(value * area)  # so that a message is of the total
+                whole.checked(value * area)  # so that an error message states the total
             return self.checked(value)
         return self.checked(whole.checked(raw) / area)
 
@@ -328,7 +328,7 @@ def _text(unit: str) -> Schema:
 
 
 def _per_area(text: str, unit: str, area: float) -> float:
-    """Per-area value of a text that gives a total or a per-area quantity."""
+    """SI value per unit area of a text with a total or a per-area quantity, for a contact of an `area` (m²)."""
     try:
         return parse(text, total_unit(unit)) / area
     except QuantityError as error:

@@ -1,8 +1,8 @@
-"""Factory of the SymPy symbols in equations, and their display letters.
+"""SymPy symbols for equations, and the letters with which they are displayed.
 
 User-given names (of parameters, memory variables, bodies) are never names of symbols. A symbol is named after its
-position; the user's name is only its display letter (`steadyslip.model.equations.Model.written`). So names cannot
-collide with the package's own, and change neither the order of terms nor the last bit of a result.
+position; the user's name is only its display letter (`steadyslip.model.equations.Model.written`). So the user's names
+cannot collide with the package's own, and change neither the order of terms nor the last bit of a result.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ def inner_symbol(name: str, **assumptions: bool | None) -> sp.Dummy:
 
 
 def inner_symbols(names: str, **assumptions: bool | None) -> tuple[sp.Dummy, ...]:
-    """Symbols by `inner_symbol` for the words of a text, such as ``"T tau sigma"``."""
+    """Symbols made by `inner_symbol`, one for each word of a text such as ``"T tau sigma"``."""
     return tuple(inner_symbol(name, **assumptions) for name in names.split())
 
 
 class Letters:
-    """Unique display letters of symbols.
+    """Unique display letters of symbols; letters in `taken` are not used.
 
     Attributes
     ----------
     known : dict of sympy.Symbol to str
-        Letters of the symbols whose letter differs from their name.
+        Display letter of each symbol whose letter differs from its name.
     """
 
     def __init__(self, taken: Iterable[str], known: Mapping[sp.Symbol, str] | None = None) -> None:
@@ -46,15 +46,15 @@ class Letters:
         self._taken = set(taken)
 
     def symbol(self, name: str, dotted: str, letter: str = "", **assumptions: bool | None) -> sp.Symbol:
-        """Make a symbol and give it a letter: `letter`, or else an unused one made from the user's dotted name."""
+        """New symbol with a display letter: `letter`, or else an unused one made from the user's dotted name."""
         found = inner_symbol(name, **assumptions)
         if found in self.known:
-            raise InternalError("every symbol to be made once only")
+            raise InternalError(f"every symbol to be made only once, not {name} again")
         self.known[found] = letter or self.unused(dotted)
         return found
 
     def unused(self, dotted: str) -> str:
-        """Make a unique letter: the last part of a dotted name, followed by earlier parts or a number if needed.
+        """New unique letter: the last part of a dotted name, followed by earlier parts or a number if needed.
 
         Collisions happen: a body and a contact may have the same name, and ``a-b`` and ``a_b`` are different names.
         """

@@ -1,7 +1,7 @@
-"""Values with tolerances as text: ``"12 ± 20 % N/um"``, ``"12 +5 % -1 % N/um"``, ``"10..14 N/um"``.
+"""Parsing of values with tolerances: ``"12 ± 20 % N/um"``, ``"12 +5 % -1 % N/um"``, ``"10..14 N/um"``.
 
-A half-width in percent is a share of the value; other half-widths are quantities like the value. The value lies
-evenly between the ends unless ``(normal)`` is written: then the half-width is one standard deviation.
+A half-width in percent is a share of the value; other half-widths are quantities like the value. The value is
+uniformly distributed between the ends unless ``(normal)`` is written: then the half-width is one standard deviation.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _MARK = re.compile(r"±|\d\s*\.\.|\(\w+\)|\d\s*(?:to|-|–)\s*\d|[-+]\s*[\d.]+\s
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Deviations of a value as text.
+    """Tolerance of a value, as text.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Tolerance:
 
 
 def split_tolerance(text: str) -> tuple[str, Tolerance] | None:
-    """Value, as text, and tolerance of a text; None for a text without a tolerance.
+    """Value (as text) and tolerance in a text such as "12 ± 2 N/um"; None for a text without a tolerance.
 
     >>> split_tolerance("12 ± 20 % N/um")
     ('12 N/um', Tolerance(below='20 %', above='20 %', normal=False))
@@ -59,7 +59,7 @@ def split_tolerance(text: str) -> tuple[str, Tolerance] | None:
     Raises
     ------
     QuantityError
-        If the text has the mark of a tolerance, but no form of one.
+        If the text has a sign of a tolerance, such as ±, but cannot be read.
     """
     plain = re.sub(r"\+/?-", "±", text).strip()
     normal = NORMAL in plain
@@ -70,7 +70,7 @@ def split_tolerance(text: str) -> tuple[str, Tolerance] | None:
         return _range(found, text, normal)
     if (found := _SAME.fullmatch(plain) or _APART.fullmatch(plain)) and "%" in found["last"]:
         raise QuantityError(
-            f"{repr_short(text)}: the per cent sign stands behind its number; write for example {EXAMPLES}"
+            f"{repr_short(text)}: the per cent sign must follow its number; write for example {EXAMPLES}"
         )
     same = _SAME.fullmatch(plain)
     if (found := same) and "(" not in found["last"]:
@@ -86,12 +86,12 @@ def split_tolerance(text: str) -> tuple[str, Tolerance] | None:
 
 
 def read_tolerance(text: str) -> Tolerance:
-    """Tolerance of a value that is given elsewhere: ``"20 %"``, ``"± 2 N/um"``, ``"+5 % -1 %"``.
+    """Tolerance in a text without the value: ``"20 %"``, ``"± 2 N/um"``, ``"+5 % -1 %"``.
 
     Raises
     ------
     QuantityError
-        If the text is none.
+        If the text is not a tolerance.
     """
     plain = re.sub(r"\+/?-", "±", text).strip()
     signed = f"0 {plain}" if re.match(r"[±+]", plain) else f"0 ± {plain}"
@@ -106,7 +106,7 @@ def read_tolerance(text: str) -> Tolerance:
 
 
 def _width(number: str, share: str | None, found: re.Match[str]) -> tuple[str, str]:
-    """Half-width with its unit, and the unit of the value; one unit may be left out."""
+    """Half-width with its unit or %, and the unit of the value; a unit that is left out is taken from the other."""
     first, last = (found["first"] or "").strip(), found["last"].strip()
     return f"{number} {'%' if share else last or first}".strip(), first or last
 

@@ -14,15 +14,15 @@ KINDS = (".py", ".pyi", ".js", ".css", ".json", ".toml")
 
 @lru_cache(maxsize=1)
 def version() -> str:
-    """Release and digest, such as ``0.2.0+s3f9c12ab``; any change of a source file changes the digest.
+    """Release and digest, such as ``0.2.0+s3f9c12ab``; any change of a source file changes the digest (cached).
 
-    Equal in a checkout, a wheel and a source distribution, on every system; cached.
+    The digest is the same in a checkout, a wheel and a source distribution, on every system.
     """
     return f"{RELEASE}+s{digest(Path(__file__).parents[1])}"
 
 
 def digest(folder: Path) -> str:
-    """First eight hexadecimal digits of the SHA-256 of file names and contents, independent of line endings."""
+    """First eight hexadecimal digits of the SHA-256 of a folder's file names and contents, with LF line endings."""
     from hashlib import sha256  # slow to import
 
     found = sha256()
@@ -31,7 +31,7 @@ def digest(folder: Path) -> str:
         if b"\r" in content:
             content = content.replace(b"\r\n", b"\n")
         found.update(f"{name}\n{len(content)}\n".encode() + content)
-    return found.hexdigest()[:8]  # 32 bits tell versions apart
+    return found.hexdigest()[:8]  # 32 bits are enough to distinguish versions
 
 
 def _files(folder: str, above: str) -> list[str]:
@@ -46,12 +46,12 @@ def _files(folder: str, above: str) -> list[str]:
 
 
 def stamped(answer: Any) -> Any:
-    """Add the program version to a dict of results, or to each of a list, unless it has one."""
+    """Copy of a dict of results, or of each dict in a list, with the program's version added unless it has one."""
     if isinstance(answer, list):
         return [stamped(one) for one in answer]
     return {"version": version()} | answer if isinstance(answer, dict) else answer
 
 
 def of_another(made: str) -> str:
-    """Note that a result was computed by another version, empty if by this one."""
+    """Note that a result was computed by the version `made`; empty if that is this version."""
     return "" if made == (own := version()) else f"computed by steadyslip {made}, this is {own}"

@@ -1,4 +1,4 @@
-"""Context of the units in which text and figures tell quantities: those in which the user wrote the rig's file."""
+"""Context with the display units of texts and figures: the units in which the user wrote the rig's file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _names: ContextVar[frozenset[str]] = ContextVar("names of units", default=frozen
 
 
 def display_names() -> frozenset[str]:
-    """Names of the units of the context."""
+    """Names of the display units of the current context; empty outside `display_units`."""
     return _names.get()
 
 
@@ -22,12 +22,12 @@ def display_names() -> frozenset[str]:
 def display_units(names: Iterable[str]) -> Iterator[None]:
     """Context in which quantities are formatted in the user's units, such as rpm, bar, mm^2 or N/um.
 
-    They are added to those of the context around. Of several units of a dimension the one is used whose number is
-    closest to 10. Units that differ from the default by a leading prefix alone, such as kN or um, have no effect on
-    results, since a suitable prefix is chosen in any case; but speeds and all that turns keep theirs, from 0.001 to
-    10 000 of it, forces and stresses that are in N or Pa alone those, and parameters what they were written in
-    (`steadyslip.core.format.format_as_written`). Friction per load is told at the load of `told_as`, or without one at
-    the largest that is named.
+    They are added to the units of the enclosing context. Among several units of one dimension, the one in which the
+    number is closest to 10 is used. Units that differ from the default only by a leading prefix, such as kN or um, have
+    no effect on results, since a suitable prefix is chosen anyway. Exceptions keep the user's unit: speeds and angular
+    quantities from 0.001 to 10 000 units; forces and stresses if all of them are in plain N or Pa; and parameters
+    (`steadyslip.core.format.format_as_written`). Friction per load is printed at the load set by `displayed_as`, or
+    else at the largest load among the units.
 
     >>> from steadyslip.core.format import format_quantity
     >>> with display_units(["rpm", "kN", "MPa", "bar", "N/um"]):
@@ -45,7 +45,7 @@ def display_units(names: Iterable[str]) -> Iterator[None]:
 
 @contextmanager
 def si_units() -> Iterator[None]:
-    """Context in which the user's units do not count: of rates and frequencies, which are no speeds or gains.
+    """Context in which the user's units are ignored: for rates and frequencies, whose unit may equal that of a gain.
 
     >>> from steadyslip.core.format import format_quantity
     >>> with display_units(["rpm"]), si_units():
@@ -60,14 +60,15 @@ def si_units() -> Iterator[None]:
 
 
 class WrittenAs(NamedTuple):
-    """How a file writes a parameter.
+    """Unit of a parameter in the rig's file, and the load at which friction per load is printed.
 
     Attributes
     ----------
     unit : str
-        Empty if it is not known.
+        Unit in the file; empty if it is not known.
     load : float or None
-        Load (N) at which friction per load is told without a unit; 0 where it is told per load, None if not known.
+        Load (N) at which friction per load is printed as a force if `unit` is empty; 0 to print it per load, None if
+        not known.
     """
 
     unit: str = ""
@@ -79,19 +80,19 @@ _written_as: ContextVar[WrittenAs] = ContextVar("how a parameter is written", de
 
 
 def display_as() -> WrittenAs:
-    """How the file writes the parameter of which quantities are told."""
+    """Unit and load that `displayed_as` has set for the current context; empty ones outside it."""
     return _written_as.get()
 
 
 @contextmanager
-def told_as(written: WrittenAs) -> Iterator[None]:
-    """Context in which values of a parameter are told: in the unit in which the file writes it, or at its load.
+def displayed_as(written: WrittenAs) -> Iterator[None]:
+    """Context in which quantities are formatted in a parameter's unit in the file, or friction per load at its load.
 
     >>> from steadyslip.core.format import format_quantity
-    >>> with display_units(["N/um at 500 N", "N/um at 60 N"]), told_as(WrittenAs(load=70.0)):
+    >>> with display_units(["N/um at 500 N", "N/um at 60 N"]), displayed_as(WrittenAs(load=70.0)):
     ...     format_quantity(1000.0, "1/m"), format_quantity(1e5, "1/m")
     ('0.07 N/um at 70 N', '7 N/um at 70 N')
-    >>> with display_units(["mm/s", "mm/min"]), told_as(WrittenAs("mm/s")):
+    >>> with display_units(["mm/s", "mm/min"]), displayed_as(WrittenAs("mm/s")):
     ...     format_quantity(8e-4, "m/s")
     '0.8 mm/s'
     """
@@ -103,9 +104,9 @@ def told_as(written: WrittenAs) -> Iterator[None]:
 
 
 def in_written_units(make: Callable[_P, _T]) -> Callable[_P, _T]:
-    """Decorator of a function that makes text or figures: quantities are in the units of the file that was read.
+    """Decorator of functions that make text or figures: quantities are formatted in the units of the rig's file.
 
-    That is the file of the rig which is among the arguments, or which one of them is the result of.
+    The rig is an argument of the function, or the ``rig`` of a result among the arguments.
     """
 
     @wraps(make)
@@ -120,5 +121,5 @@ def in_written_units(make: Callable[_P, _T]) -> Callable[_P, _T]:
 
 
 def _written_in(one: Any) -> tuple[str, ...]:
-    """Units in which a rig, or the rig of a result, was written; none for anything else."""
+    """Units of the file of a rig, or of a result's rig; empty for any other object."""
     return getattr(one, "written_in", ()) or getattr(getattr(one, "rig", None), "written_in", ())

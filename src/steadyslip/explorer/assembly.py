@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from steadyslip.core.areas import outside, told_area
+from steadyslip.core.areas import display_area, outside
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import units_for
@@ -42,7 +42,7 @@ from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.nearness import nearest_end
 from steadyslip.linear.search import Search
 from steadyslip.linear.status import STABLE, UNDAMPED, UNSTABLE, status
-from steadyslip.machine.letters import letter_of, said
+from steadyslip.machine.letters import label_of, letter_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
@@ -206,8 +206,8 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "title": title,
         "version": version(),
         "branch": branch,
-        "area": told_area("Pa", rig.area),
-        "stiffnessArea": told_area("Pa/m", rig.area),
+        "area": display_area("Pa", rig.area),
+        "stiffnessArea": display_area("Pa/m", rig.area),
         "parameters": [_parameter(rig, name, branch) | file.source_fields(name) for name in names],
         "facts": {key: value for key, value in facts.items() if key != "parameters"},  # the page has them from `places`
         "places": places,
@@ -300,7 +300,7 @@ def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
     natural = Search(rig, name, rig.kept_zeros(), branch).natural_size()
     found = {
         "name": name,
-        "title": said(rig, name),
+        "title": label_of(rig, name),
         "letter": letter_of(rig, name),
         "doc": one.role.doc,
         "unit": unit,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from steadyslip.core.areas import outside, told_area
+from steadyslip.core.areas import display_area, outside
 from steadyslip.core.records import with_values
 from steadyslip.files.specifications.template import ParameterSource, RigTemplate, rig_template
 from steadyslip.files.specifications.write import rig_to_text
@@ -62,7 +62,7 @@ def own_file(rig: Slider | Machine, names: Sequence[str], text: str) -> OwnFile:
 
 def display_unit(rig: Slider | Machine, unit: str) -> tuple[float, str]:
     """Factor and unit in which a page shows a parameter: SI units, of sliders told in forces those of totals."""
-    return outside(unit, told_area(unit, rig.area))
+    return outside(unit, display_area(unit, rig.area))
 
 
 def _file_pieces(rig: Slider | Machine, names: Sequence[str], found: RigTemplate) -> list[Any]:

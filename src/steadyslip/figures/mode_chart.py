@@ -9,7 +9,7 @@ import numpy as np
 
 from steadyslip.core.format import typeset
 from steadyslip.core.palette import BLACK, BLUE, GREEN, GREY, LINES, ORANGE, PURPLE, SKY, VERMILION
-from steadyslip.core.written import told_as
+from steadyslip.core.written import displayed_as
 from steadyslip.figures.style import (
     add_legend_above,
     axis_label,
@@ -60,7 +60,7 @@ def mode_chart(found: ModeChart, ax: Any = None) -> Any:
         axes = given_panels(ax, (2,), "two, for frequencies and damping ratios")
     frequencies, ratios = found.frequencies, found.damping_ratios
     shown = found.least_damped
-    with told_as(found.rig.written_as(found.parameter)):
+    with displayed_as(found.rig.written_as(found.parameter)):
         factor, unit = display_unit(
             found.unit, float(np.max(np.abs(found.values))), found.rig.printed_area(found.parameter)
         )

@@ -19,14 +19,14 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter
 
-from steadyslip.core.areas import outside, stress_name, told_area
+from steadyslip.core.areas import display_area, outside, stress_name
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_quantity, typeset
 from steadyslip.core.palette import BLACK, GREY, STABLE, UNSTABLE
 from steadyslip.core.records import records_in
 from steadyslip.core.version import version
-from steadyslip.core.written import told_as
+from steadyslip.core.written import displayed_as
 from steadyslip.linear.status import (
     ABSENT as ABSENT_CODE,
     STABLE as STABLE_CODE,
@@ -34,7 +34,7 @@ from steadyslip.linear.status import (
     UNKNOWN as UNKNOWN_CODE,
     UNSTABLE as UNSTABLE_CODE,
 )  # fmt: skip
-from steadyslip.machine.letters import estimate_words, letter_of, said
+from steadyslip.machine.letters import estimate_words, label_of, letter_of
 from steadyslip.machine.rig import Rig
 from steadyslip.motion.protocol_words import changed_by, protocol_words
 from steadyslip.protocol import Protocol
@@ -296,9 +296,9 @@ def _values_of(rig: Rig, names: Iterable[str]) -> Iterator[str]:
     for name in names:
         one = rig.parameters()[name]
         if one.value and np.ndim(one.value) == 0:
-            with told_as(rig.written_as(name)):
-                word = format_quantity(*rig.told(name, float(one.value)), 4, rig.printed_area(name))
-            yield _unbroken(f"{said(rig, name)} {typeset(word)}")
+            with displayed_as(rig.written_as(name)):
+                word = format_quantity(*rig.display_value(name, float(one.value)), 4, rig.printed_area(name))
+            yield _unbroken(f"{label_of(rig, name)} {typeset(word)}")
 
 
 def _unbroken(text: str) -> str:
@@ -326,7 +326,7 @@ def display_unit(si_unit: str, typical: float, area: float | None = None) -> tup
     ((1000000000.0, 'GPa/m'), 'deg')
     """
     name = format_quantity(typical, si_unit, area=area).partition(" ")[2]
-    factor = (unit(name)[0] if name else 1.0) / outside(si_unit, told_area(si_unit, area))[0]
+    factor = (unit(name)[0] if name else 1.0) / outside(si_unit, display_area(si_unit, area))[0]
     return factor, typeset(name)
 
 
@@ -396,7 +396,7 @@ def parameter_label(rig: Rig, name: str) -> str:
     >>> parameter_label(paper_rig(), "contact.angle"), parameter_label(paper_rig(), "friction.d_c")
     ('angle ψ', 'slip distance $d_{\\mathrm{c}}$')
     """
-    text, letter = said(rig, name), letter_of(rig, name)
+    text, letter = label_of(rig, name), letter_of(rig, name)
     base, line, below = letter.partition("_")
     return text.replace(letter, _subscript(base, below)) if line and not below.isdigit() else text
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.palette import BLACK, BLUE, STABLE, UNSTABLE
-from steadyslip.core.written import told_as
+from steadyslip.core.written import displayed_as
 from steadyslip.figures.style import (
     HALO,
     SAFETY_WORDS,
@@ -59,7 +59,7 @@ def two_rigs(found: RigComparison, ax: Axes | None = None) -> Axes:
     own = [float(rig.parameters()[name].value) for rig in rigs]
     x = np.union1d(_values(rigs[0].parameters()[name].role, own), own)
     heights = _heights(found, rigs, name, x)
-    with told_as(rigs[0].written_as(name)):
+    with displayed_as(rigs[0].written_as(name)):
         factor, unit = display_unit(rigs[0].parameters()[name].role.unit, own[0] or own[1], rigs[0].printed_area(name))
     ax = axes_or_new(ax)
     for label, style, value, curve in zip(found.names, _CURVES, own, heights.curves, strict=True):

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction, derivative
-from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.kernels.build import Code, code_of, interpreting
 from steadyslip.kernels.formulation import Choice, Formulation
@@ -265,7 +265,7 @@ class ExperimentProgram:
         return constants, np.ascontiguousarray(start.reshape(jobs, -1))
 
 
-@question
+@cached
 def experiment_program(
     model: Model, directions: int, method: str, settled: bool = True, observed: str | None = None
 ) -> ExperimentProgram:

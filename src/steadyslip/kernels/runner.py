@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.questions import question
+from steadyslip.core.caching import cached
 from steadyslip.kernels.build import Code, code_of, interpreting
 from steadyslip.kernels.driver.places import guess_count
 from steadyslip.kernels.events import LOG_KINDS, TALLY
@@ -77,12 +77,12 @@ class Runner:
         return table
 
 
-@question
+@cached
 def _constants(point: OperatingPoint, machine: Runner) -> np.ndarray:
     return machine._table(point)
 
 
-@question
+@cached
 def runner(
     model: Model,
     choice: Choice,

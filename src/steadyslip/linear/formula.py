@@ -8,10 +8,10 @@ from threading import Thread
 
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.options import checked
-from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.linear import cubic
 from steadyslip.linear.response import response
@@ -98,7 +98,7 @@ def _name(rig: Slider | Machine, along: str | None) -> str:
     return name_along(rig, along)
 
 
-@question
+@cached
 def _condition(model: Model, name: str) -> sp.Eq:
     """Equation for a parameter at which the last but one Hurwitz determinant vanishes: roots on the imaginary axis."""
     symbol, c = model.parameters.get(name), tuple(map(model.written, characteristic_coefficients(model)))
@@ -129,7 +129,7 @@ def _stresses(contact: Contact) -> list[sp.Expr]:
     return [sp.sympify(one) for one in own if one is not None]
 
 
-@question
+@cached
 def _formula(model: Model) -> sp.Eq:
     known = _answers(model)
     friction = model.written(model.steady[model.contact.friction] / model.contact.sigma_ss)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import PreciseFunction
-from steadyslip.core.questions import question
 from steadyslip.linear.roots import ComplexArray
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows
@@ -100,7 +100,7 @@ def _summed(table: list[Any], terms: list[Any], size: int) -> Any:
     return mpmath.matrix([entries[i : i + size] for i in range(0, len(entries), size)])
 
 
-@question
+@cached
 def _precise_matrix(model: Model) -> tuple[list[tuple[int, ...]], PreciseFunction, PreciseFunction]:
     """Powers in the characteristic matrix, and functions of mpmath's numbers: what stands before each, and delays."""
     powers, entries = matrix_entries(model)
@@ -165,7 +165,7 @@ def _pencil(p0: Any, p1: Any, p2: Any) -> tuple[Any, Any]:
     return a, e
 
 
-@question
+@cached
 def matrix_entries(model: Model) -> tuple[list[tuple[int, ...]], list[sp.Expr]]:
     """Powers of s and of exp(−s delay) in the characteristic matrix, and row by row what stands before each."""
     entries = [entry for row in characteristic_rows(model).values() for entry in row]

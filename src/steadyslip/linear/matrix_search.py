@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from steadyslip.core.questions import question
+from steadyslip.core.caching import cached
 from steadyslip.linear import samples
 from steadyslip.linear.allowance import may_take
 from steadyslip.linear.roots import Array
@@ -366,7 +366,7 @@ def _distinct(values: Array, omega: Array) -> tuple[Array, Array]:
     return values[keep], omega[keep]
 
 
-@question
+@cached
 def decay_rate(point: MachinePoint) -> float:
     """Fastest decay rate of the contacts' memory (1/s), zero without memory."""
     from steadyslip.model.numeric.balance import state_of

@@ -16,7 +16,7 @@ from steadyslip.core.format import format_quantity
 from steadyslip.core.options import LOW_AND_HIGH, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.written import told_as
+from steadyslip.core.written import displayed_as
 from steadyslip.files.output import write_columns
 from steadyslip.linear.boundary import boundary
 from steadyslip.linear.mode_origin import Origin
@@ -160,7 +160,7 @@ class ModeChart(Displayed):
 
     def told(self, value: float) -> str:
         """A value of the parameter with its unit."""
-        with told_as(self.rig.written_as(self.parameter)):
+        with displayed_as(self.rig.written_as(self.parameter)):
             return format_quantity(value, self.unit, area=self.rig.printed_area(self.parameter)) or "0"
 
 

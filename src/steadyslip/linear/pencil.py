@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import question
 from steadyslip.linear.argument import count_by_argument
 from steadyslip.linear.high_precision_eigenvalues import matrix_entries, precise_eigenvalues, precise_root
 from steadyslip.linear.neutral import can_vanish
@@ -75,7 +75,7 @@ class CheckedSpectrum:
         return self.complete and bool(np.all(_is_good(self.values, self.errors)))
 
 
-@question
+@cached
 def checked_spectrum(point: OperatingPoint) -> CheckedSpectrum:
     """Eigenvalues (1/s) of a single rig, each with an error, and whether the argument principle finds as many growing.
 
@@ -283,7 +283,7 @@ def _spread(s: ComplexArray, errors: Array) -> Array:
     return np.asarray(np.where(np.isnan(best), np.inf, best))
 
 
-@question
+@cached
 def matrix_function(model: Model) -> tuple[list[tuple[int, ...]], ArrayFunction]:
     """Powers of s and of exp(−s delay) in the characteristic matrix, and of every entry what stands before each."""
     powers, entries = matrix_entries(model)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import question
 from steadyslip.model import Model
 from steadyslip.model.eigenvalues import blocks_of
 from steadyslip.model.point import OperatingPoint, stacked
@@ -54,7 +54,7 @@ def receptance(
     return np.asarray(np.concatenate([out_x, out_z], axis=-1) @ moved + out_u)
 
 
-@question
+@cached
 def _delays(model: Model) -> ArrayFunction:
     """Array function of the delays, s."""
     return model.function(model.delays)

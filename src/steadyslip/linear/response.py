@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, Num, derivative
 from steadyslip.core.options import checked, slider
 from steadyslip.core.pages import Displayed
-from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.roots import quietly
 from steadyslip.machine.slider import Slider
@@ -89,7 +89,7 @@ def has_closed_form(model: Model) -> bool:
     return model.has_closed_form
 
 
-@question
+@cached
 def response(model: Model) -> Response:
     """The response of a model with one memory variable.
 
@@ -141,7 +141,7 @@ def _mechanics(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
     )
 
 
-@question
+@cached
 def contact_coefficients(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
     """B0, B1, B2, B3 of eq. 12 that a contact law comes down to, at steady sliding.
 
@@ -221,7 +221,7 @@ _UNITS = {"f": "Pa s/m", "S": "Pa s/m", "r": "1/s", "f1": "1", "mu": "1", "B0": 
 _UNITS |= {"B2": "1", "B3": "Pa/m", "m": "kg/m^2", "k": "Pa/m"}
 
 
-@question
+@cached
 def _response_function(model: Model) -> tuple[list[str], ArrayFunction]:
     known = response(model).as_dict()
     return list(known), model.function(known.values())

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.core.caching import cached
 from steadyslip.core.dimensions import Dimension, unit
 from steadyslip.core.errors import NoSteadySliding, NotAvailable
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
-from steadyslip.core.questions import question
 from steadyslip.linear import samples
 from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.polynomials import StableSet
@@ -438,7 +438,7 @@ def _within(places: Array, low: Array, high: Array) -> NDArray[np.bool_]:
     return np.asarray(np.searchsorted(rising, low) < np.searchsorted(rising, high))
 
 
-@question
+@cached
 def _decay_function(model: Model) -> ArrayFunction:
     """Function that gives the signed decay rates (1/s) of memory that depend on the rig's numbers alone."""
     linear = linearise(model)

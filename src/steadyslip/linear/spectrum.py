@@ -6,7 +6,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from steadyslip.core.questions import question
+from steadyslip.core.caching import cached
 from steadyslip.linear import crossing, quasipolynomial as with_delays, rightmost as late_roots
 from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.high_precision_eigenvalues import precise_eigenvalues
@@ -49,14 +49,14 @@ def growth(point: OperatingPoint) -> Array:
     return np.asarray(np.where(np.isneginf(rate), np.nan, rate))
 
 
-@question
+@cached
 def _rightmost(point: OperatingPoint, count: int) -> ComplexArray:
     c, h = quasipolynomial(point)
     c = np.where(late_on_springs(point)[..., None, None], np.nan, c)
     return late_roots.rightmost(c, h, delays_in_terms(point.model), count)
 
 
-@question
+@cached
 def _of_state_matrix(point: OperatingPoint) -> ComplexArray:
     found, lost = eigenvalues_of(point), digits_lost(point)
     if not np.any(lost):
@@ -86,14 +86,14 @@ def can_be_counted(point: OperatingPoint) -> NDArray[np.bool_]:
     return np.asarray(counts(point) != UNKNOWN) if point.model.delays else np.ones(point.shape, dtype=bool)
 
 
-@question
+@cached
 def counts(point: OperatingPoint) -> NDArray[np.int64]:
     """As `unstable_roots`, with `UNKNOWN` where roots cannot be counted."""
     found = with_delays.count_right_if_feasible(*quasipolynomial(point), delays_in_terms(point.model))
     return np.where(late_on_springs(point) & point.exists, with_delays.INFINITE, found)
 
 
-@question
+@cached
 def unstable_roots(point: OperatingPoint) -> NDArray[np.int64]:
     """Number of roots right of the axis, for points with delays; `quasipolynomial.INFINITE`, or −1 if not finite."""
     if np.all(can_be_counted(point)):
@@ -154,7 +154,7 @@ def static_sum(point: OperatingPoint) -> Array:
     )
 
 
-@question
+@cached
 def nearness(point: OperatingPoint) -> Array:
     """Two measures, (2, ...), that change sign where a root crosses the imaginary axis: in pairs, or alone."""
     if not point.model.delays:

@@ -8,9 +8,9 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked
-from steadyslip.core.questions import question
 from steadyslip.linear import matrix_route
 from steadyslip.linear.crossing import share_left
 from steadyslip.linear.response import has_closed_form, response_numbers
@@ -125,7 +125,7 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
     return bool(np.any((status_where_counted(others) != own) & can_be_counted(others)))
 
 
-@question
+@cached
 def _static_terms(model: Model) -> ArrayFunction:
     """Function that gives the terms of a machine's static stiffness a0; none where a0 is not written out in symbols."""
     if not is_written_out(model):
@@ -134,7 +134,7 @@ def _static_terms(model: Model) -> ArrayFunction:
     return model.function(part for own in parts for part in own)
 
 
-@question
+@cached
 def is_neutral(point: OperatingPoint) -> NDArray[np.bool_]:
     """True where the static stiffness is zero to 9 digits, relative to its terms."""
     if has_closed_form(point.model):

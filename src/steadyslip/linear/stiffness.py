@@ -16,10 +16,10 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import IllPosedWarning, InternalError, UndecidedWarning
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked, slider
-from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.linear import cubic, matrix_route
 from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_many_windows_error
@@ -264,7 +264,7 @@ def _size(point: OperatingPoint) -> Array:
     return np.where(own > 0, own, np.where(gain > 0, gain, 1.0))
 
 
-@question
+@cached
 def _split_function(model: Model) -> ArrayFunction:
     p, q = stiffness_split(model)
     return model.function([*p, *q])
@@ -296,7 +296,7 @@ def _lost(product: Array) -> NDArray[np.bool_]:
     return np.asarray(~((size > _LEAST) & (size < 1 / _LEAST)))
 
 
-@question
+@cached
 def interval_ingredients(model: Model) -> tuple[sp.Expr, ...]:
     """Expressions N, D, μB2, μB3, a2, a3 (arguments of `cubic.stable_interval`) and the gain of a controller.
 
@@ -314,7 +314,7 @@ def interval_ingredients(model: Model) -> tuple[sp.Expr, ...]:
     return numerator, denominator, mu_b2, mu_b3, a2, a3, model.gain
 
 
-@question
+@cached
 def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
     """Function of a point that gives where steady sliding exists, then the numbers of `interval_ingredients`."""
     wanted = interval_ingredients(model)

@@ -1,7 +1,7 @@
 """Rigs: a slider with one contact, a machine with any number; bodies, links, surfaces and drives.
 
-Knows laws as such and what is done to a rig, and nothing of files, of the Model or of what becomes of a rig. Names are
-listed in ``__init__.pyi`` and loaded on first use.
+Depends on laws and protocols, but not on files, the Model or results. Names are listed in ``__init__.pyi`` and loaded
+on first use.
 """
 
 import lazy_loader

@@ -9,14 +9,14 @@ from steadyslip.core.records import FrozenRecord, parameter
 
 
 class Body(FrozenRecord, family="body"):
-    """Base of bodies; an inertia of zero, the default, neglects it."""
+    """Base of bodies; the default inertia, zero, means that inertia is neglected."""
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("motion", "slide")
     turns: ClassVar[bool] = False
     lifts: ClassVar[bool] = False
     """True if the body also moves away from the surface."""
     is_structure: ClassVar[bool] = False
-    """True if links and contacts name points of the body."""
+    """True if links and contacts are attached to named points of the body."""
 
     def inertia_of(self) -> Any:
         """Mass (kg), or moment of inertia (kg m²)."""
@@ -32,7 +32,7 @@ class Body(FrozenRecord, family="body"):
 
 
 class SlidingBody(Body, name="slide"):
-    """A body that moves along the slide only."""
+    """A body that moves only along the slide."""
 
     mass: float = parameter("kg", nonnegative, "mass m", default=0.0, structural=True, letter="m")
     force: float = parameter(
@@ -52,7 +52,7 @@ class SlidingBody(Body, name="slide"):
 
 
 class PlanarBody(SlidingBody, name="plane"):
-    """A body that moves along the slide and away from the surface; a compliant contact carries it."""
+    """A body that moves along the slide and away from the surface, supported by a compliant contact."""
 
     press: float = parameter(
         "N", real, "constant force towards the surface (weight, piston)", default=0.0, structural=True, letter="P"

@@ -1,8 +1,8 @@
 """Sketch of a machine: layout of bodies, links, contacts and drive with their names and values.
 
-Bodies are placed in columns, ordered by links away from the drive; bodies in sliding contact with one of them are
-placed above or below it. A `Pencil` draws the strokes: that of `steadyslip.figures` in Matplotlib, that of
-`steadyslip.explorer` in SVG. Lengths are in units of the drawing.
+Bodies are placed in columns, ordered by the number of links from the drive; bodies in sliding contact with a body of
+this row are placed above or below it. A `Pencil` is a drawing back end: `steadyslip.figures` has one for Matplotlib,
+`steadyslip.explorer` one for SVG. Lengths are in units of the drawing.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ INK, PALE, DRIVEN, FORCED = "ink", "pale", "driven", "forced"
 """Colours of bodies and links, of the ground, of the drive, and of constant forces."""
 # sizes chosen by trial, so that labels and links do not overlap
 _WIDE, _HIGH = 1.7, 1.15  # width and height of a body
-LONG = 9  # letters; longer names are written small
+LONG = 9  # letters; longer names are written in small type
 _ACROSS, _UP = 3.7, 1.85  # distance of columns, and of rows of bodies that slide on each other
 _HOLD = 1.5  # length of links to a wall
 
 
 @dataclass
 class _Place:
-    """Centre of a body in the sketch, and number of links attached at its left and right side."""
+    """Centre of a body in the sketch, and number of links attached on its left and right side."""
 
     x: float
     y: float
     taken: dict[str, int] = field(default_factory=dict)
 
     def side(self, way: str) -> tuple[float, float]:
-        """Point at which the next link is attached on the side ``"left"`` or ``"right"``; links spread in height."""
+        """Point at which the next link is attached on the side ``"left"`` or ``"right"``; links differ in height."""
         count = self.taken.get(way, 0)
         self.taken[way] = count + 1
         step = (0.0, 0.3, -0.3, 0.45, -0.45)[min(count, 4)]
@@ -122,7 +122,7 @@ class Pencil:
 
 
 class Drawing:
-    """Layout of one machine's sketch: motion to the right, away from the surface upwards.
+    """Sketch of one machine: the slide points to the right, away from the surface is up.
 
     Without `values` only names are written, for pages on which the numbers change.
     """
@@ -143,7 +143,7 @@ class Drawing:
         self._drive()
 
     def _label(self, name: str, value: str, between: str = "\n") -> str:
-        """Text of a name, with its value if values are written."""
+        """Name, followed by the value if values are written."""
         return f"{name}{between}{value}" if self.values else name
 
     # -- bodies and contacts
@@ -179,7 +179,7 @@ class Drawing:
             self.pencil.words(x + 0.12, y + 0.6, size, color=FORCED, ha="left")
 
     def _contacts(self, name: str) -> None:
-        """Draw the contacts of a body: pads side by side on ground or drive, interfaces with other bodies."""
+        """Draw the contacts of a body: pads on ground or drive side by side, and interfaces with other bodies."""
         place = self.places[name]
         own = [(n, one) for n, one in self.machine.contacts.items() if one.held == name]
         beside = [(n, one) for n, one in own if one.base in (GROUND, LOAD_POINT)]
@@ -225,7 +225,7 @@ class Drawing:
         self.pencil.words((ends[0][0] + ends[1][0]) / 2, y, self._label(name, self._load(name, one), ", "), paper=True)
 
     def _load(self, name: str, one: Surface) -> str:
-        """Text of a contact's load and radius."""
+        """Text with a contact's load and radius."""
         return self._pressed(name, one) + (f" at {format_own(one.radius, 'm')}" if one.radius is not None else "")
 
     def _pressed(self, name: str, one: Surface) -> str:
@@ -265,7 +265,7 @@ class Drawing:
             self._named(name, link, ((start[0] + end[0]) / 2, max(start[1], end[1]) + 0.32), va="bottom")
 
     def _over(self, name: str, link: Link, left: str, right: str) -> None:
-        """Draw a link above the bodies that stand between its ends."""
+        """Draw a link above the bodies between its ends."""
         one, two = self.places[left], self.places[right]
         y = self._next_level()
         shift = 0.6 - 0.12 * self.levels
@@ -315,7 +315,7 @@ class Drawing:
         return max(p.y for p in self.places.values()) + _HIGH / 2 + 0.75 + 0.95 * (self.levels - 1)
 
     def _free_side(self, place: _Place, other: str) -> str:
-        """Side with room for a link to a wall, ``"over"`` if none; the load point prefers left, the ground right."""
+        """Side with room for a link to a wall, or ``"over"`` if both are taken; left first for the load point."""
         row = [p for p in self.places.values() if abs(p.y - place.y) < 1]
         left = place.taken.get("left", 0) > 0 or any(p.x < place.x - 0.1 for p in row)
         right = place.taken.get("right", 0) > 0 or any(p.x > place.x + 0.1 for p in row)
@@ -333,7 +333,7 @@ class Drawing:
             self.pencil.line(*ends[:2])
             return
         self.pencil.line(*ends[:2], color=DRIVEN, linewidth=3)
-        if not self.drive_drawn:  # one arrow only, though several links may lead to the load point
+        if not self.drive_drawn:  # only one arrow, even if several links end at the load point
             self.drive_drawn = True
             begin = (x - 0.55, y + 0.58) if abs(along) > abs(up) else (x - 0.4, y + 0.2)
             self.pencil.arrow(begin, (begin[0] + 0.9, begin[1]))
@@ -360,9 +360,9 @@ class Drawing:
     # -- the drive
 
     def _speed(self) -> str:
-        """Text of the drive's speed, or of that of the body whose speed was given."""
-        told = format_quantity(*self.machine.told("drive.velocity", float(self.machine.drive.velocity)))
-        return told if self.machine.fed is None else f"{told} of {self.machine.fed}"
+        """Text of the speed of the drive, or of the body whose speed the user gave."""
+        text = format_quantity(*self.machine.display_value("drive.velocity", float(self.machine.drive.velocity)))
+        return text if self.machine.fed is None else f"{text} of {self.machine.fed}"
 
     def _drive(self) -> None:
         drive = self.machine.drive
@@ -403,9 +403,9 @@ class Drawing:
 
 
 def _places(machine: Machine) -> dict[str, _Place]:
-    """Places of all bodies: a row ordered by links away from the drive.
+    """Places of all bodies by name: a row, ordered by the number of links from the drive.
 
-    Bodies outside this chain that are in contact with one of the row are placed alternately below and above it.
+    Other bodies that are in contact with a body of the row are placed alternately below and above it.
     """
     ties = [link.between for link in machine.links.values() if GROUND not in link.between]
     order = [machine.drive.driven() or LOAD_POINT]

@@ -16,11 +16,11 @@ from steadyslip.machine.mechanism import Limits
 
 
 class Drive(FrozenRecord, family="drive", kw_only=False):
-    """Base of drives: steady velocity and controller gains, which are zero unless overridden."""
+    """Base of drives of sliders: steady velocity, and controller gains that are zero unless overridden."""
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")
     turns: ClassVar[bool] = False
-    """True of a machine's load point that rotates."""
+    """True for a drive that rotates; only machines have one."""
 
     velocity: float = parameter("m/s", moving, "velocity of the load point in steady sliding", letter="v_0")
 
@@ -33,7 +33,7 @@ class Drive(FrozenRecord, family="drive", kw_only=False):
         return 0
 
     def integral(self) -> Any:
-        """Stress per time integral of the slip x (Pa/(m s)); None without integral action."""
+        """Integral gain (Pa/(m s)): stress per time integral of the slip x; None without integral action."""
         return None
 
     def lateness(self) -> Any:
@@ -41,7 +41,7 @@ class Drive(FrozenRecord, family="drive", kw_only=False):
         return 0
 
     def limits(self) -> Limits | None:
-        """What sets a controller apart from a linear one; None for a load point."""
+        """Limits, dead band and sampling of a controller; None for a load point."""
         return None
 
 

@@ -1,4 +1,4 @@
-"""Checks of names in the tables of a machine file, possible even if other faults prevent a `Machine`."""
+"""Checks of body and link names in the raw tables of a machine file, which work even if no `Machine` can be made."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steadyslip.machine.mechanism import GROUND, LOAD_POINT
 
 
 def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
-    """Yield Problems with names of bodies and links in raw tables: unknown ones, and bodies that nothing refers to."""
+    """Yield Problems for unknown names of bodies and links in raw tables, and for bodies that nothing refers to."""
     bodies, links, contacts = (_tables(tables.get(name)) for name in ("bodies", "links", "contacts"))
     own = bodies
     bodies = {end: body for name, body in own.items() for end in _points(name, body, [*links.values()], contacts)}
@@ -33,18 +33,21 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
     lost = list(unreferenced_bodies(own, [*map(body_of, named), driven.get("body")]))
     yield from lost
     if all(end in (*bodies, GROUND, LOAD_POINT) for end in named if isinstance(end, str)):
-        told = {problem.name for problem in lost}
+        reported = {problem.name for problem in lost}
         plain = [name for name, body in own.items() if not _is_structure(body)]
-        yield from (one for one in _floating(plain, links, driven.get("body")) if one.name not in told)
+        yield from (one for one in _floating(plain, links, driven.get("body")) if one.name not in reported)
 
 
 def body_of(end: Any) -> Any:
-    """Name of the body at an end: of a point ``caliper.pad`` the structure."""
+    """Name of the body at an end of a link or contact: ``caliper`` for the point ``caliper.pad`` of a structure."""
     return end.partition(".")[0] if isinstance(end, str) else end
 
 
 def _is_structure(body: Mapping[str, Any]) -> bool:
-    """True for a raw table of a structure, also with the word misspelt or left out: that is told, not its points."""
+    """True for a raw table of a structure, even if the word "structure" is misspelt or missing.
+
+    That fault is reported elsewhere; its points must not be reported as unknown bodies.
+    """
     named = body.get("motion", body.get("kind"))
     if named is None:
         return any(key in body for key in ("matrices", "modes", "response"))
@@ -54,7 +57,7 @@ def _is_structure(body: Mapping[str, Any]) -> bool:
 def _points(
     name: str, body: Mapping[str, Any], links: Sequence[Mapping[str, Any]], contacts: Mapping[str, Mapping[str, Any]]
 ) -> list[str]:
-    """Ends at a body in raw tables; of a structure every point that is named, as its file may know more of them."""
+    """Valid ends at a body: its name; for a structure all points named by links and contacts, in case it has them."""
     if not _is_structure(body):
         return [name]
     ends = [end for link in links if isinstance(link.get("between"), list) for end in link["between"]]
@@ -73,15 +76,15 @@ def _floating(bodies: Iterable[str], links: Mapping[str, Mapping[str, Any]], dri
 
 
 def floating_body(name: str) -> Problem:
-    """Problem of a body whose speed in steady sliding is undetermined."""
+    """Problem for a body whose speed in steady sliding is undetermined."""
     return Problem(
         f"bodies.{name}", "floats: no chain of links with stiffness ties it to the drive or the ground, so that its "
-        "speed in steady sliding is open",
+        "speed in steady sliding is undetermined",
     )  # fmt: skip
 
 
 def unreferenced_bodies(bodies: Iterable[str], named: Sequence[Any]) -> Iterator[Problem]:
-    """Yield a Problem for each body that no name refers to, unless a misspelt name was probably meant for it."""
+    """Yield a Problem for each body that is not among the names, unless a misspelt name is similar to it."""
     bodies = list(bodies)
     meant = {near for end in named if isinstance(end, str) and end not in bodies
              for near in get_close_matches(end, bodies, cutoff=0.5)}  # fmt: skip
@@ -95,6 +98,6 @@ def _tables(raw: Any) -> dict[str, dict[str, Any]]:
 
 
 def unknown_body(where: str, name: Any, known: list[str]) -> Iterator[Problem]:
-    """Yield a Problem if a name is not that of a known body; values of other types are ignored."""
+    """Yield a Problem if a text is not the name of a known body; values of other types are ignored."""
     if isinstance(name, str) and name not in known:
         yield Problem(where, unknown_name("body", name, known))

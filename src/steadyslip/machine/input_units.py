@@ -1,4 +1,4 @@
-"""Units of protocol quantities, which depend on the rig: stresses, forces or torques; displacements or angles."""
+"""Conversion of protocol quantities whose units depend on the rig: stress, force or torque; displacement or angle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steadyslip.machine.rig import Rig
 from steadyslip.protocol import Protocol
 
 TURNING = {"m": "rad", "m/s": "rad/s", "m/s^2": "rad/s^2"}
-"""Units of the motion of a load point that rotates, by the unit of one that slides."""
+"""Units of a rotation by the corresponding unit of a displacement."""
 
 
 def in_units_of(rig: Rig, plan: Protocol) -> Protocol:
@@ -29,14 +29,14 @@ def in_units_of(rig: Rig, plan: Protocol) -> Protocol:
         _, _, number, _ = name.split(".", 3)
         piece, given = plan.pieces[int(number) - 1], address.value
         declared = address.role.unit
-        moved = declared in TURNING  # a motion of the target or load point, told of the body whose feed is given
+        moved = declared in TURNING  # motion of the drive, given in terms of the body whose feed the user gave
         wanted = TURNING[declared] if moved and turns else declared if moved else rig.protocol_unit(piece, declared)
         if given.unit == wanted:
             changes[name] = float(given) / ratio if moved else float(given)
         elif rig.area is not None and given.unit == total_unit(wanted):
             changes[name] = float(given) / rig.area
         else:
-            hint = "; of a slider with an area a force will do" if (given.unit, wanted) == ("N", "Pa") else ""
+            hint = "; a slider with an area also takes a force" if (given.unit, wanted) == ("N", "Pa") else ""
             problems.append(
                 Problem(name, f"got {float(given):g} {given.unit}; allowed here: a number in {wanted}{hint}")
             )

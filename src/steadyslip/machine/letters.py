@@ -1,4 +1,4 @@
-"""Names of parameters as people say them: a word and the letter of the equations, in place of a dotted path."""
+"""Labels of parameters in texts: words and the letter of the equations in place of a dotted name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _BY_KIND = {
     "reference rate": "reference rate",
     "stress share": "stress share",
 }
-"""Words for a kind of parameter whose name is its letter."""
+"""Words for parameters whose name is only a letter, by their kind."""
 _BY_NAME = {
     "kp": "proportional gain",
     "kd": "derivative gain",
@@ -30,13 +30,13 @@ _BY_NAME = {
     "sigma_ref": "reference stress",
     "press": "pressing force",
 }
-"""Words for names that are short for them."""
+"""Words for parameters by the last part of their dotted name, which is an abbreviation."""
 _GREEK = dict(zip("alpha beta gamma delta eta theta mu phi sigma tau psi".split(), "αβγδηθμφστψ", strict=True))  # noqa: SIM905
 _DIGITS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _NUMERALS = frozenset("one two three four five six seven eight nine ten first second third last the this that".split())  # noqa: SIM905
-"""Names of members that read as a word of the sentence; they are told with their kind, as letters are."""
+"""Names of members that could be read as words of a sentence; labels put body, link or contact before them."""
 MEMBERS: Final = ("bodies", "links", "contacts")
-"""First parts of the names of parameters of a machine's members, which are followed by the member's name."""
+"""First parts of dotted names of a machine's parameters that are followed by the name of a body, link or contact."""
 _KINDS = dict(zip(MEMBERS, ("body", "link", "contact"), strict=True))
 
 
@@ -57,12 +57,12 @@ def letter_of(rig: Rig, name: str) -> str:
 
 
 def _number_in(name: str) -> str:
-    """Number of one of several states in the name of its parameter; empty for others."""
+    """Number of the state in a dotted name such as ``friction.states.2.b``; empty if it has no number."""
     return next((part for part in name.split(".") if part.isdigit()), "")
 
 
 def words_of(rig: Rig, name: str) -> str:
-    """Name of a parameter in words, without its letter: "preload", "slip distance"; its member first in a machine.
+    """Words for a parameter without its letter, such as "slip distance"; in machines after the body, link or contact.
 
     >>> from steadyslip.reproduce import paper_rig
     >>> [words_of(paper_rig(), name) for name in ("contact.preload", "friction.d_c", "drive.velocity")]
@@ -70,7 +70,7 @@ def words_of(rig: Rig, name: str) -> str:
     """
     part, *between, last = name.split(".")
     base, role, own = last.partition("_")[0], rig.parameters()[name].role, part in MEMBERS
-    words = _BY_NAME.get(last, "") if role.letter else ""  # without a letter it is a user's, of the same name
+    words = _BY_NAME.get(last, "") if role.letter else ""  # no letter: a user's own parameter of that name
     if not words and (len(base) == 1 or base in _GREEK):
         words = _BY_KIND.get(role.kind, "reference velocity" if last == "v_ref" else "" if own else part)
     elif part == "drive":
@@ -82,25 +82,25 @@ def words_of(rig: Rig, name: str) -> str:
     return f"{member} {words}".strip()
 
 
-def said(rig: Rig, name: str) -> str:
-    """Words and letter of a parameter as plain text, after its part of the rig where these alone name two parameters.
+def label_of(rig: Rig, name: str) -> str:
+    """Words and letter of a parameter as plain text; preceded by the part of the rig if another has the same text.
 
-    What differs between rigs but is no number, such as a choice of law, is named by the words of its path; names joined
-    by + are told one by one.
+    Dotted names that are no parameters, such as the choice of a law, become words. Names joined by + are converted one
+    by one and joined by "and".
 
     >>> from steadyslip.reproduce import paper_rig
-    >>> said(paper_rig(), "contact.preload"), said(paper_rig(), "contact.angle"), said(paper_rig(), "friction.d_c")
-    ('preload σ₀', 'angle ψ', 'slip distance d_c')
-    >>> said(paper_rig(), "friction.evolution")
+    >>> [label_of(paper_rig(), name) for name in ("contact.preload", "contact.angle", "friction.d_c")]
+    ['preload σ₀', 'angle ψ', 'slip distance d_c']
+    >>> label_of(paper_rig(), "friction.evolution")
     'friction evolution'
     """
     if "+" in name:
-        return " and ".join(said(rig, one) for one in name.split("+"))
+        return " and ".join(label_of(rig, one) for one in name.split("+"))
     if name not in rig.parameters():
         part, _, rest = name.partition(".")
         return (rest if part in MEMBERS else name).replace(".", " ").replace("_", " ")
-    text = _said(rig, name)
-    if text and [_said(rig, other) for other in rig.parameters()].count(text) == 1:
+    text = _own_words(rig, name)
+    if text and [_own_words(rig, other) for other in rig.parameters()].count(text) == 1:
         return text
     return f"{name.partition('.')[0]} {text}"
 
@@ -120,23 +120,23 @@ _ESTIMATES = {
     r"k/k_c": ("stiffness over critical k/k_c", "k/k_c"),
     r"k/k_cal": ("stiffness over that of the calibration k/k_cal", "k/k_cal"),
 }
-"""Words for what a fit finds beside parameters of a rig, and shorter ones for an axis."""
+"""Long and short words for estimates of a fit that are no parameters of the rig, by a pattern of their name."""
 
 
 def estimate_words(rig: Rig, name: str) -> str:
-    """Words of what a fit finds: a parameter of the rig, or of the record, whose number stands behind "@".
+    """Words for an estimate of a fit: a parameter of the rig, or of a record, whose number follows "@".
 
     >>> from steadyslip.reproduce import paper_rig
     >>> [estimate_words(paper_rig(), name) for name in ("friction.a@2", "step.1.at", "trend.1")]
     ['direct effect a (record 2)', 'time of change 1 of the drive', 'drift of friction over the record']
     """
     bare, _, record = name.partition("@")
-    text = _estimate(bare)[0] or said(rig, bare)
+    text = _estimate(bare)[0] or label_of(rig, bare)
     return f"{text} (record {record})" if record else text
 
 
 def estimate_label(name: str) -> str:
-    """Short words of what a fit finds, for an axis: those of the record, or the last part of the name of a parameter.
+    """Short words for an estimate of a fit, for an axis; for a parameter of the rig the last part of its name.
 
     >>> [estimate_label(name) for name in ("friction.a@2", "step.1.at", "trend.1", "friction.states.2.b")]
     ['a (2)', 'change 1', 'drift', 'b_2']
@@ -148,7 +148,7 @@ def estimate_label(name: str) -> str:
 
 
 def _estimate(name: str) -> tuple[str, str]:
-    """Words, and shorter ones, of what a fit finds beside parameters of a rig; empty for a parameter."""
+    """Long and short words for an estimate of a fit that is no parameter of the rig; empty texts for a parameter."""
     found = ((re.fullmatch(pattern, name), words) for pattern, words in _ESTIMATES.items())
     for match, (long, short) in found:
         if match:
@@ -157,7 +157,7 @@ def _estimate(name: str) -> tuple[str, str]:
 
 
 def worded(rig: Rig, text: str) -> str:
-    """Text with words and letters instead of the dotted names of parameters, and of what a fit finds beside them.
+    """Text in which the dotted names of parameters and of other estimates of a fit are replaced by their labels.
 
     >>> from steadyslip.reproduce import paper_rig
     >>> worded(paper_rig(), "measure friction.d_c (67 %) next; step.1.at is open")
@@ -166,17 +166,17 @@ def worded(rig: Rig, text: str) -> str:
 
     def words(found: re.Match[str]) -> str:
         name = found[0]
-        return said(rig, name) if name in rig.parameters() else _estimate(name)[0] or name
+        return label_of(rig, name) if name in rig.parameters() else _estimate(name)[0] or name
 
     return re.sub(r"(?<![\w.-])\w+(?:\.[\w-]+)+", words, text)
 
 
-def _said(rig: Rig, name: str) -> str:
+def _own_words(rig: Rig, name: str) -> str:
     return f"{words_of(rig, name)} {plain(letter_of(rig, name))}".strip()
 
 
 def plain(letter: str) -> str:
-    """Letter as plain text, with digits below the line.
+    """Letter as plain text, with a number after "_" as subscript digits.
 
     >>> plain("σ_0"), plain("d_c")
     ('σ₀', 'd_c')

@@ -112,9 +112,9 @@ class Machine(Rig):
         measured, speeds = self.drive.watched()[0], self._speeds()[0]
         return abs(float(speeds[measured] / speeds[driven])), bool(self._turns(measured))
 
-    def told(self, name: str, value: float) -> tuple[float, str]:
+    def display_value(self, name: str, value: float) -> tuple[float, str]:
         if name != "drive.velocity" or self.fed is None:
-            return super().told(name, value)
+            return super().display_value(name, value)
         ratio, turns = self.feed()
         return value * ratio, "rad/s" if turns else "m/s"
 

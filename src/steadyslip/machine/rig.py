@@ -1,4 +1,4 @@
-"""Base class of rigs: parameters by dotted name, and a mechanism."""
+"""Base class of sliders and machines: parameters by dotted name, display units, and the mechanism."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
+from steadyslip.core.caching import HasCache, cached
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.names import resolve
 from steadyslip.core.quantities import column_with_text, parse, units_in, units_named
-from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import Address, FrozenRecord, parameters, replaced
 from steadyslip.core.written import WrittenAs
 from steadyslip.laws.contact import ContactLaw
@@ -21,7 +21,7 @@ S = TypeVar("S", bound="Rig")
 
 
 class LawsOfContact(NamedTuple):
-    """Laws at one contact: prefix of their parameters' names, and area (m²) of a machine's contact that has one."""
+    """Laws of one contact, prefix of their parameters' names, and area (m²) of a machine's contact, None without."""
 
     prefix: str
     friction: FrictionLaw
@@ -29,10 +29,10 @@ class LawsOfContact(NamedTuple):
     area: float | None = None
 
 
-class Rig(FrozenRecord, Keeper):
+class Rig(FrozenRecord, HasCache):
     """Base of `Slider` and `Machine`: a frozen record with parameters by dotted name and a mechanism."""
 
-    if TYPE_CHECKING:  # fields of the records, or constants of the class: named bodies, named contacts
+    if TYPE_CHECKING:  # fields in one subclass, class constants in the other
 
         @property
         def area(self) -> float | None: ...
@@ -46,98 +46,98 @@ class Rig(FrozenRecord, Keeper):
     always_symbols: ClassVar[Mapping[str, str]] = {}
     """Parameters that are symbols of the Model even if the rig does not give them, with their letters."""
     replaces: ClassVar[Mapping[str, str]] = {}
-    """Parameters that may be given in place of others: name to name of the replaced one."""
+    """Parameters that may be given instead of others: dotted name to the name of the parameter replaced."""
 
     not_in_model: ClassVar[tuple[str, ...]] = ()
     """Parameters that occur in no equation of the Model."""
 
     default_along: ClassVar[str | None] = None
-    """Parameter along which edges and cycles are sought unless another is named; None if none stands out."""
+    """Parameter that searches for edges and cycles vary by default; None if the user must name one."""
 
     in_forces: ClassVar[bool] = False
-    """True if loads and frictions of rigs of this class are told as forces, not as stresses."""
+    """True if normal loads and friction of this class are forces (N), not stresses (Pa)."""
 
     words: ClassVar[Mapping[str, str]] = {}
-    """Words of messages about a rig of this class: `rig`, `block`, `place` of a coordinate by its name, and what limits
-    its speed, `damping` and `mass`."""
+    """Words for messages about this class: ``rig``, ``block``, ``place`` of a coordinate ({}: its name), and
+    ``damping`` and ``mass``, of which one must be added if nothing limits a speed."""
 
     read_from: ClassVar[str] = ""
-    """Name of the file that the rig was read from, for a caption; no part of its value."""
+    """Name of the file from which the rig was read, for captions; not compared by ==."""
 
     units_named: ClassVar[Mapping[str, str]] = {}
-    """Units in which the file writes parameters, such as ``N/um at 6 kN``, by name; no part of the rig's value."""
+    """Units of parameters in the file, such as ``N/um at 6 kN``, by dotted name; not compared by ==."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.written_in:  # of a copy by dataclasses.replace: its parts know the file
-            self.told_in(name for one in self._parts() for name in one.written_in)
+        if not self.written_in:  # a copy by dataclasses.replace takes the file's units from its parts
+            self.set_display_units(name for one in self._parts() for name in one.written_in)
 
     def named(self, file: str) -> Self:
-        """The rig itself, which is told to be from this file from now on."""
+        """Set the name of the file from which the rig was read, and return the rig itself."""
         object.__setattr__(self, "read_from", file)
         return self
 
-    def told_by(self, units: Mapping[str, str]) -> Self:
-        """The rig itself, of which parameters are told in these units from now on, by name."""
+    def set_parameter_units(self, units: Mapping[str, str]) -> Self:
+        """Set the units in which parameters are printed from now on, by dotted name, and return the rig itself."""
         object.__setattr__(self, "units_named", dict(units))
         return self
 
-    def told_in(self, names: Iterable[str]) -> Self:
-        """The rig itself, which is told in these units from now on, and so is what is made of its parts."""
+    def set_display_units(self, names: Iterable[str]) -> Self:
+        """Set the units in which the rig and its parts are printed from now on, and return the rig itself."""
         names = tuple(names)
         for one in self._parts():
-            one.told_in(names)
-        return super().told_in(names)
+            one.set_display_units(names)
+        return super().set_display_units(names)
 
     def _parts(self) -> Iterator[FrozenRecord]:
-        """Records that the rig is made of, such as its laws."""
+        """Yield the records in the rig's fields, such as its laws."""
         for item in fields(self):
-            value = self.__dict__.get(item.name)  # not the default of a class, while it is being made
+            value = self.__dict__.get(item.name)  # not getattr: class defaults are no parts, and fields may be unset
             several = value.values() if isinstance(value, Mapping) else value if isinstance(value, tuple) else (value,)
             yield from (one for one in several if isinstance(one, FrozenRecord))
 
     def ends(self) -> tuple[str, ...]:
-        """What can be pushed, by name: bodies, and of structures the points; none of a slider's one block."""
+        """Names of bodies, and of points of structures, on which forces can act; empty for a slider."""
         return tuple(self.bodies)
 
     @property
     def contact_names(self) -> tuple[str, ...]:
-        """Names of the contacts, which prefix their results; empty for the one contact of a slider."""
+        """Names of a machine's contacts, which are prefixes of their results; empty for a slider."""
         return ()
 
     def result_name(self, name: str) -> str:
-        """Name of a result: that of a slider's, or of a machine's, whose loads are forces."""
+        """Name of a result of this rig, from the name for sliders: machines have forces in place of stresses."""
         return name
 
     def result_unit(self, unit: str) -> str:
-        """SI unit of a result: that of a slider's, or of a machine's, whose loads are forces."""
+        """SI unit of a result of this rig, from the unit for sliders: machines have N in place of Pa."""
         return unit
 
     def protocol_unit(self, piece: Piece, unit: str) -> str:
-        """SI unit of a quantity of a piece of a protocol on this rig; `unit` is the declared one."""
+        """SI unit, for this rig, of a quantity of a protocol piece that is declared with the SI unit `unit`."""
         return unit
 
     def turns_on(self, body: str | None) -> bool:
-        """True if the named body rotates; None names the only body of a rig that has one."""
+        """True if the named body rotates; None stands for the rig's only body."""
         return False
 
     @property
     def protocol_area(self) -> float | None:
-        """Area (m²) by which stresses in a protocol are multiplied to be written as forces; None if they are not."""
+        """Area (m²) that converts stresses in a protocol to forces in files; None if files have stresses."""
         raise NotImplementedError
 
     def place_problems(
         self, argument: str, name: str | None, known: Iterable[str], what: str = "body"
     ) -> list[Problem]:  # fmt: skip
-        """Problem with the name of a body or contact (`what`), one of those `known`, as a list; empty for None.
+        """List with a Problem if `name` is not a `known` body or contact (`what`); empty if it is, or for None.
 
-        A slider has no names of either. `argument` is what the message calls the name.
+        `argument` is the argument that the Problem names. A slider has neither named bodies nor named contacts.
         """
         known = list(known)
         return [] if name is None or name in known else [Problem(argument, unknown_name(what, name, known))]
 
     def check_branch(self, branch: int) -> None:
-        """Raise an error for a branch (number of a steady sliding) that rigs of this class never have.
+        """Raise an error for a branch (number of a solution for steady sliding) that rigs of this class never have.
 
         Raises
         ------
@@ -146,15 +146,15 @@ class Rig(FrozenRecord, Keeper):
         """
 
     def laws_by_contact(self) -> dict[str, LawsOfContact]:
-        """Laws of each contact by its name in the Model, which is empty for a slider's."""
+        """Laws of each contact by its name in the Model; the name of a slider's contact is empty."""
         raise NotImplementedError
 
     def pulls_at(self, contact: str) -> tuple[str, ...]:
-        """Names of the links, and ``the controller``, whose forces are the pull at a contact; none for a slider."""
+        """Names of the links, or "the controller", whose forces make up the pull at a contact; empty for a slider."""
         return ()
 
     def lever_at(self, contact: str) -> float | None:
-        """Radius (m) by which the pull at a contact is a torque on a body that turns; None where that body slides."""
+        """Radius (m) of a contact at which the pull is a torque on a rotating body; None for a sliding body."""
         return None
 
     @property
@@ -172,11 +172,11 @@ class Rig(FrozenRecord, Keeper):
         raise NotImplementedError
 
     def printed_area(self, name: str) -> float | None:
-        """Area (m²) if this parameter is printed as a total of the contact; None where contacts have own areas."""
+        """Area (m²) if this parameter is printed as a total of the contact, else None (always for machines)."""
         raise NotImplementedError
 
     def load_of(self, name: str) -> float | None:
-        """Force that presses the contact whose parameter this is, N; None of other parameters, or without an area."""
+        """Normal force (N) on the contact to which a parameter belongs; None for other parameters or without area."""
         for prefix, _, _, own in self.laws_by_contact().values():
             area = 1.0 if self.in_forces and own is None else self.area if own is None else own
             pressed = next((n for n in self.of_kind("normal stress") if n.startswith(prefix)), "")
@@ -185,10 +185,10 @@ class Rig(FrozenRecord, Keeper):
         return None
 
     def written_as(self, name: str) -> WrittenAs:
-        """Unit in which the file writes a parameter, and the load at which friction is told that it does not write.
+        """Unit of a parameter in the file, and the load (N) at which friction per load is printed without such a unit.
 
-        The load is that of the contact, or where it is not known one that the file names for another parameter there,
-        or 0 without any, so that friction is told per load; None of what is of no contact.
+        The load is the contact's normal force, or else a load in the file for another parameter of the contact, or else
+        0, which prints friction per load. It is None for parameters that belong to no contact.
         """
         prefix = next((own.prefix for own in self.laws_by_contact().values() if name.startswith(own.prefix)), None)
         if prefix is None:
@@ -198,40 +198,42 @@ class Rig(FrozenRecord, Keeper):
         return WrittenAs(self.units_named.get(name, ""), self.load_of(name) or beside)
 
     def parameters(self) -> dict[str, Address]:
-        """Parameters of the rig by dotted name: role, with the user's unit, and value (cached)."""
+        """Parameters of the rig by dotted name: role, with the SI unit for this kind of rig, and value (cached)."""
         return dict(_parameters(self))
 
     def declared(self) -> dict[str, Address]:
-        """Collect the parameters (uncached)."""
+        """Parameters of the rig by dotted name, collected anew (`parameters` caches them)."""
         return parameters(self)
 
-    def told(self, name: str, value: float) -> tuple[float, str]:
-        """Value of a parameter and its unit, as people are told it: the speed of the body whose speed they gave."""
+    def display_value(self, name: str, value: float) -> tuple[float, str]:
+        """Value and SI unit with which a parameter is printed: drive.velocity as speed of the body in velocity_of."""
         return value, self.parameters()[name].role.unit
 
     def feed(self) -> tuple[float, bool]:
-        """Motion that people give and are told for one of the drive: its own, or of the body that they named; whether
-        that body turns."""
+        """Ratio of the motion that users give to the drive's, and True if it is a rotation.
+
+        Users give the motion of the body in `velocity_of`, or else that of the drive.
+        """
         return 1.0, bool(self.drive.turns)
 
     def seen(self) -> tuple[float, bool]:
-        """Motion of the body that a controller measures for one of the drive, and whether that body turns."""
+        """Ratio of the measured body's motion to the drive's, and True if the measured body turns."""
         return 1.0, bool(self.drive.turns)
 
     def gain_name(self) -> str | None:
-        """Name of the drive's parameter that equals the stiffness it adds; None if there is none."""
+        """Name of the drive's parameter that equals the stiffness added by the controller; None if there is none."""
         return None
 
     def kept_zeros(self, name: str | None = None) -> tuple[str, ...]:
         """Names of parameters that are zero but stay in the equations, so that they can be varied from zero.
 
-        For a machine that is at most `name`, the one that is varied: masses and dampings kept so would raise the degree
+        For a machine at most `name`, the parameter that is varied: further masses and dampings would raise the degree
         of its polynomial and hide other edges.
         """
         raise NotImplementedError
 
     def parameter_along(self, name: str) -> str:
-        """Full name of a parameter; a slider's "stiffness" becomes what it has: a spring's, a press's, or a gain kp."""
+        """Full name of a parameter; a slider's "stiffness" becomes axial_stiffness or kp if it has only those."""
         return self.resolve(name)
 
     def resolve(self, name: str) -> str:
@@ -247,7 +249,8 @@ class Rig(FrozenRecord, Keeper):
     def read(self, name: str, value: Any) -> Any:
         """Convert a value of a parameter, or a list of them, to SI units.
 
-        Text may give a total of a contact with an area, and the speed of the body by which that of the drive is `told`.
+        Text may have the unit of the total of a contact with an area; for drive.velocity it has the unit of
+        `display_value`.
 
         Raises
         ------
@@ -258,7 +261,7 @@ class Rig(FrozenRecord, Keeper):
             return [self.read(name, item) for item in items]
         if not isinstance(value, str):
             return value
-        factor, unit = self.told(name, 1.0)
+        factor, unit = self.display_value(name, 1.0)
         role = self.parameters()[name].role
         try:
             found = (role if unit == role.unit else replace(role, unit=unit)).read(value, self.area_of(name))
@@ -267,7 +270,7 @@ class Rig(FrozenRecord, Keeper):
             raise ParameterError([problem.under(name) for problem in error.problems]) from error
 
     def of_kind(self, kind: str) -> tuple[str, ...]:
-        """Dotted names of the given parameters with a `kind` of `PARAMETER_KINDS`, in order."""
+        """Dotted names of the parameters of a `kind` (`PARAMETER_KINDS`) that have a value, in order."""
         return tuple(n for n, a in self.parameters().items() if a.role.kind == kind and a.value is not None)
 
     def value(self, name: str) -> float | None:
@@ -298,10 +301,11 @@ class Rig(FrozenRecord, Keeper):
         if problems:
             raise ParameterError(problems)
         texts = {one for one in changes.values() if isinstance(one, str)}
-        copy = replaced(self, full).told_in((*self.written_in, *units_in(texts))).named(self.read_from)
-        return copy.told_by({**self.units_named, **units_named({self.resolve(n): one for n, one in changes.items()})})
+        copy = replaced(self, full).set_display_units((*self.written_in, *units_in(texts))).named(self.read_from)
+        units = units_named({self.resolve(name): value for name, value in changes.items()})
+        return copy.set_parameter_units({**self.units_named, **units})
 
 
-@question
+@cached
 def _parameters(rig: Rig) -> dict[str, Address]:
     return rig.declared()

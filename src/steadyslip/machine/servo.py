@@ -18,9 +18,10 @@ from steadyslip.machine.mechanism import Limits
 
 
 class MachineDrive(FrozenRecord, family="drive of a machine"):
-    """Base of drives; `velocity` is that of the driven body, or of the load point, which links call ``drive``.
+    """Base of drives of machines; `velocity` is that of the driven body, or of the load point, ``drive`` in links.
 
-    With `velocity_of` it is that of another body, such as the feed of a table, until the machine converts it.
+    With `velocity_of`, the given velocity is that of another body, such as the feed of a table; the constructor of the
+    machine converts it.
     """
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")
@@ -37,7 +38,7 @@ class MachineDrive(FrozenRecord, family="drive of a machine"):
         return None
 
     def watched(self) -> tuple[str, str]:
-        """Bodies whose position and whose speed a controller measures."""
+        """Names of the body whose position and of the body whose speed a controller measures."""
         raise NotImplementedError
 
     def lateness(self) -> Any:
@@ -45,11 +46,14 @@ class MachineDrive(FrozenRecord, family="drive of a machine"):
         return 0
 
     def gains(self) -> tuple[Any, Any, Any, Any]:
-        """Gains on position of the first watched body, speed and position of the second, and integral of the first."""
+        """Four gains: on position of the first `watched` body, on speed and position of the second, on the integral.
+
+        The integral is that of the first body's position error; its gain is None without integral action.
+        """
         return 0, 0, 0, None
 
     def limits(self) -> Limits | None:
-        """What sets a controller apart from a linear one; None for a load point."""
+        """Limits, dead band and sampling of a controller; None for a load point."""
         return None
 
 
@@ -65,7 +69,7 @@ class RotaryPull(MachineDrive, name="rotary-steady"):
 
 
 class _Controller(Holding, MachineDrive):
-    """Base of controllers that act on a body; `delay` is the dead time of the measurement."""
+    """Base of controllers that act on a body; `delay` is the dead time (s) between measuring and acting."""
 
     body: str = setting(Text("the body on which it acts"))
     measured: str | None = setting(
@@ -105,8 +109,8 @@ class PositionPID(PositionPD, name="pid"):
 class Cascade(_Controller, name="p-pi"):
     """Cascade of a position loop and a speed loop (P-PI): F = Kp [e + ∫e dt / Tn], e = Kv x_e + v_e.
 
-    The position x_e is that of `measured` (a scale at the table), the speed v_e that of the driven body (the encoder of
-    the motor) unless `speed_measured` names another.
+    x_e is the position error of the body `measured` (a scale at the table); v_e is the speed error of the driven body
+    (the encoder of the motor), or of `speed_measured` if given.
     """
 
     speed_measured: str | None = setting(
@@ -135,14 +139,14 @@ class _Rotary(_Controller):
 
 
 class RotaryPD(_Rotary, PositionPD, name="rotary-pd"):
-    """`PositionPD` of a body that rotates."""
+    """`PositionPD` for a body that rotates."""
 
     kp: float = parameter("N m/rad", positive, "proportional gain", kind="stiffness", letter="k_p")
     kd: float = parameter("N m s/rad", nonnegative, "derivative gain", default=0.0, structural=True, letter="k_d")
 
 
 class RotaryPID(_Rotary, PositionPID, name="rotary-pid"):
-    """`PositionPID` of a body that rotates."""
+    """`PositionPID` for a body that rotates."""
 
     kp: float = parameter("N m/rad", positive, "proportional gain", kind="stiffness", letter="k_p")
     kd: float = parameter("N m s/rad", nonnegative, "derivative gain", default=0.0, structural=True, letter="k_d")
@@ -150,22 +154,22 @@ class RotaryPID(_Rotary, PositionPID, name="rotary-pid"):
 
 
 class RotaryCascade(_Rotary, Cascade, name="rotary-p-pi"):
-    """`Cascade` of a body that rotates."""
+    """`Cascade` for a body that rotates."""
 
     kp: float = parameter("N m s/rad", positive, "gain Kp of the speed loop", letter="K_p")
 
 
 def control_for(control: str, turns: bool) -> str:
-    """Name of the same kind of drive for a body that turns, or for one that slides."""
+    """Name of a drive's counterpart for a body that turns (``rotary-pd`` for ``pd``), or for a body that slides."""
     return f"rotary-{control.removeprefix('rotary-')}" if turns else control.removeprefix("rotary-")
 
 
 def kind_of_control(control: str) -> str:
-    """Kind of a controller as people write it: "PID" of ``rotary-pid``."""
+    """Usual name of a kind of controller: "PID" for ``rotary-pid``."""
     return control_for(control, turns=False).upper()
 
 
 def wrong_control(control: str, body: str, turns: bool) -> Problem:
-    """Problem to report if a drive for rotation acts on a body that slides, or the reverse; names the right one."""
+    """Problem for a rotary drive on a body that slides, or the reverse; the message has the right `control`."""
     does = "turns" if turns else "slides"
     return Problem("drive.control", f"got {control!r}, but {body!r} {does}; write {control_for(control, turns)!r}")

@@ -7,8 +7,8 @@ from math import lgamma
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction, derivative
-from steadyslip.core.questions import question
 from steadyslip.model.dead_time import ORDERS
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
@@ -50,7 +50,7 @@ def pade_error(order: int, turn: float) -> float:
     return float(np.exp(min(factorials + 2 * order * np.log(turn), 700.0)))
 
 
-@question
+@cached
 def _frequencies(model: Model) -> ArrayFunction:
     """Array function of bounds of the squared angular frequencies of bodies, (rad/s)², then of the delays, s.
 

@@ -19,9 +19,9 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_rows, is_written_out, linearise, sets_of_delays
 from steadyslip.model.point import OperatingPoint, stacked
@@ -159,7 +159,7 @@ class Descriptor:
         )  # fmt: skip
 
 
-@question
+@cached
 def block_function(
     model: Model, outputs: tuple[str, ...], inputs: tuple[str, ...], at_once: tuple[sp.Expr, ...] = ()
 ) -> tuple[ArrayFunction, list[tuple[int, int]]]:
@@ -215,7 +215,7 @@ MOVED = 1e-6
 _ROUNDING = 4 * np.finfo(float).eps  # relative, of what a few operations make of the rig's numbers
 
 
-@question
+@cached
 def coefficients_from_eigenvalues(point: OperatingPoint) -> list[Array]:
     """Coefficients of the polynomial of each term of the characteristic equation, (..., n+1), lowest power first.
 
@@ -233,7 +233,7 @@ def coefficients_from_eigenvalues(point: OperatingPoint) -> list[Array]:
     return found
 
 
-@question
+@cached
 def eigenvalues_of(point: OperatingPoint, late: Delays = ()) -> NDArray[np.complex128]:
     """Eigenvalues (1/s), (..., n), by falling real part.
 
@@ -246,7 +246,7 @@ def eigenvalues_of(point: OperatingPoint, late: Delays = ()) -> NDArray[np.compl
         return np.take_along_axis(found, order, axis=-1)
 
 
-@question
+@cached
 def digits_lost(point: OperatingPoint) -> NDArray[np.bool_]:
     """True where rounding of the state matrix moves an eigenvalue by more than `MOVED` of it, (...).
 
@@ -280,7 +280,7 @@ def _polynomial(point: OperatingPoint, late: Delays) -> Array:
         return np.asarray(c.real * (sign * np.exp(logarithm))[..., None])
 
 
-@question
+@cached
 def _eigenvalues(point: OperatingPoint, late: Delays) -> tuple[NDArray[np.complex128], Array]:
     """Eigenvalues of the state matrix in any order, and by how much a relative change of its entries moves them."""
     blocks = blocks_of(point, (), (), late)
@@ -334,7 +334,7 @@ def _characteristic_matrix(point: OperatingPoint, late: Delays, place: Array) ->
     return np.where(good[..., None, None], found, np.nan)
 
 
-@question
+@cached
 def _entries(model: Model, late: Delays) -> tuple[ArrayFunction, list[tuple[int, int, int]]]:
     """Array function of the nonzero entries of the characteristic matrix, and row, column and power of s of each."""
     wanted, places = [], []

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import sympy as sp
 
+from steadyslip.core.caching import HasCache, cached
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, latex, replaced
 from steadyslip.core.pages import Displayed
-from steadyslip.core.questions import Keeper, question
 from steadyslip.core.roles import Parameter
 from steadyslip.core.symbols import inner_symbols
 from steadyslip.machine.mechanism import NORMAL, Shares
@@ -198,7 +198,7 @@ class Carried:
 
 
 @dataclass(frozen=True, eq=False)
-class Model(Keeper, Displayed):
+class Model(HasCache, Displayed):
     """Equations of a rig.
 
     The variables y obey y' = `rates`. The `balance` = 0 of each contact determines its friction stress; the balance of
@@ -206,7 +206,7 @@ class Model(Keeper, Displayed):
     for both. Slip rates and the stresses T, τ, σ are given by `definitions`, in this order, as functions of variables,
     unknowns and inputs.
 
-    Derived expressions and functions are cached with the Model (`steadyslip.core.questions`): its methods here, and in
+    Derived expressions and functions are cached with the Model (`steadyslip.core.caching`): its methods here, and in
     neighbouring modules `linearise`, `reduce_model`, `system` (Taylor terms) and `steady_equation`. Numbers come with
     an `operating_point`.
 
@@ -429,6 +429,6 @@ class Model(Keeper, Displayed):
         return "$$\\begin{aligned}" + r" \\ ".join(rows) + "\\end{aligned}$$"
 
 
-@question
+@cached
 def _function(model: Model, expressions: tuple[sp.Expr, ...], further: tuple[sp.Symbol, ...]) -> ArrayFunction:
     return ArrayFunction([*model.arguments, *further], expressions)

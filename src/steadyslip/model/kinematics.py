@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import asinh_exp, derivative, replaced
-from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.equations import Contact, Coordinate, Model
 
@@ -72,7 +72,7 @@ class Kinematics:
         return next((i for i, one in enumerate(self.coordinates) if one is coordinate), None)
 
 
-@question
+@cached
 def kinematics(model: Model) -> Kinematics:
     """Choose the velocity variables of a model."""
     wanted = [_variable(model, i) for i in range(len(model.contacts))]

@@ -12,9 +12,9 @@ from itertools import combinations
 
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
-from steadyslip.core.questions import question
 from steadyslip.model.determinant import (
     Placeholders,
     Polynomial,
@@ -59,7 +59,7 @@ class Linearisation:
     outputs: dict[str, Gradient]
 
 
-@question
+@cached
 def linearise(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> Linearisation:
     """Differentiate a Model at steady sliding; the intermediate stresses `kept` are not eliminated but unknowns."""
     velocities = {one.displacement: one.velocity for one in model.coordinates}
@@ -96,7 +96,7 @@ def linearise(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> Linearisation:
     return Linearisation(model, tuple(columns), rows, outputs)
 
 
-@question
+@cached
 def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
     """Coefficients of the characteristic polynomial in s, lowest power first (theory 3: a0, a1, ...).
 
@@ -113,7 +113,7 @@ def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
     return characteristic_terms(model)[0].coefficients
 
 
-@question
+@cached
 def characteristic_terms(model: Model) -> tuple[Term, ...]:
     """Terms of the characteristic equation: polynomials in s times exp(−s delay), the one without delay first.
 
@@ -142,7 +142,7 @@ def characteristic_terms(model: Model) -> tuple[Term, ...]:
     )
 
 
-@question
+@cached
 def _determinant(model: Model) -> Polynomial | None:
     """Characteristic determinant; None if it has too many terms."""
     if model.is_single:
@@ -171,7 +171,7 @@ def is_written_out(model: Model) -> bool:
     return _determinant(model) is not None
 
 
-@question
+@cached
 def delays_of_terms(model: Model) -> list[tuple[sp.Expr, ...]]:
     """Delays (s) that act in each term of the characteristic equation, none in the first; each acts once at most."""
     return [term.late for term in characteristic_terms(model)] if is_written_out(model) else sets_of_delays(model)
@@ -196,7 +196,7 @@ def _single_determinant(model: Model) -> Polynomial:
     return {powers: placeholders.restored(sum_of_terms(terms, names)) for powers, terms in found.items()}
 
 
-@question
+@cached
 def characteristic_rows(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> dict[sp.Symbol, list[Polynomial]]:
     """Characteristic matrix; each entry has coefficients by exponents of s and of exp(−s delay) of each delay.
 
@@ -235,7 +235,7 @@ def characteristic_rows(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> dict[
     return found
 
 
-@question
+@cached
 def stiffness_split(model: Model) -> tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]:
     """Split the characteristic polynomial into p(s) + k q(s); coefficients of p and q, lowest power first.
 

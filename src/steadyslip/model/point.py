@@ -15,9 +15,9 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import BroadcastArrays, broadcast, check_together, checked_array, valid_together
+from steadyslip.core.caching import HasCache, cached
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import Keeper, question
 from steadyslip.machine.rig import Rig
 from steadyslip.model.build import in_matrices, model_of
 from steadyslip.model.equations import MOVED, Model
@@ -27,7 +27,7 @@ Vary = Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class OperatingPoint(Keeper):
+class OperatingPoint(HasCache):
     """A Model with values of its parameters, and its steady state.
 
     Attributes
@@ -233,12 +233,12 @@ def _make_point(model: Model, rig: Rig, arrays: BroadcastArrays, branch: int, sc
     return OperatingPoint(model, arguments, arrays.shape, arrays.wrap, branch, valid)
 
 
-@question
+@cached
 def _gain(model: Model) -> ArrayFunction:
     return ArrayFunction([*model.parameters.values()], [model.gain])
 
 
-@question
+@cached
 def _axial_share(model: Model) -> Callable[[Mapping[str, Any]], Any]:
     """Function of values by dotted name that returns the ratio of k to the axial stiffness."""
     share = sp.sympify(model.axial_share)

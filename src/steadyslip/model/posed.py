@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction, derivative
-from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.kinematics import kinematics
 from steadyslip.model.linearisation import linearise
@@ -17,7 +17,7 @@ _UNDETERMINED = 1e-9  # share of the other dampings below which one determines n
 MOST_NOISE = 1e-2  # change of ln v by rounding of forces, above which it affects the motion; chosen by trial
 
 
-@question
+@cached
 def well_posed(point: OperatingPoint) -> np.ndarray:
     """True where the motion near steady sliding is well-posed, (rigs,).
 
@@ -77,7 +77,7 @@ def vanishing_terms(model: Model) -> list[tuple[sp.Expr, ...]]:
     return found
 
 
-@question
+@cached
 def spare_powers(point: OperatingPoint) -> np.ndarray:
     """Number of highest powers of s that the characteristic equation may lose, (...): by inertias and dampings of 0.
 
@@ -94,7 +94,7 @@ def spare_powers(point: OperatingPoint) -> np.ndarray:
     return np.asarray(2 * np.sum(_inertial(model)) + _determined_in_general(model) - powers)
 
 
-@question
+@cached
 def late_on_springs(point: OperatingPoint) -> np.ndarray:
     """True where a force acts late on what it measures, a motion of bodies without mass that only springs hold, (...).
 
@@ -119,7 +119,7 @@ def late_on_springs(point: OperatingPoint) -> np.ndarray:
     return np.asarray(shares.reshape(point.shape))
 
 
-@question
+@cached
 def _late_entries(model: Model) -> list[sp.Expr]:
     """Slope of the force on each coordinate by each place and speed, at each delay, by rows (n, n); empty without."""
     linear = linearise(model)
@@ -148,12 +148,12 @@ def _inertial(model: Model) -> np.ndarray:
     return np.array([one.inertial for one in model.coordinates])
 
 
-@question
+@cached
 def _of_contacts(model: Model) -> np.ndarray:
     return np.array([kinematics(model).contact_at(one) is not None for one in model.coordinates])
 
 
-@question
+@cached
 def _dissipation_entries(model: Model) -> list[sp.Expr]:
     """Matrix of dampings (n, n) between the coordinates of a machine, then the slip rate of each contact by velocity.
 
@@ -165,12 +165,12 @@ def _dissipation_entries(model: Model) -> list[sp.Expr]:
     return dampings + [model.at_steady(derivative(slip, v)) for slip in slips for v in moving]
 
 
-@question
+@cached
 def _dissipation(model: Model) -> ArrayFunction:
     return model.function(_dissipation_entries(model))
 
 
-@question
+@cached
 def _determined_in_general(model: Model) -> int:
     """Number of velocities of coordinates without inertia that friction and dampings determine, for most values."""
     light = ~_inertial(model)
@@ -206,13 +206,13 @@ def _resistance(values: np.ndarray, light: np.ndarray) -> np.ndarray:
     return np.asarray(dampings / (size[:, :, None] * size[:, None, :]) + np.swapaxes(slips, 1, 2) @ slips)
 
 
-@question
+@cached
 def _rising(model: Model) -> tuple[ArrayFunction, int]:
     rows = balance_jacobian(model)
     return model.function(e for row in rows for e in row), len(rows)
 
 
-@question
+@cached
 def _force_function(model: Model, index: int) -> ArrayFunction:
     """Array function of the sizes of stresses (Pa) at a contact in steady sliding.
 
@@ -230,7 +230,7 @@ def _force_function(model: Model, index: int) -> ArrayFunction:
     return model.function([dashpot, *pressing, model.steady[contact.spring], model.steady[contact.friction], *shares])
 
 
-@question
+@cached
 def resolved(point: OperatingPoint) -> np.ndarray:
     """True where rounding of the forces changes the velocity of steady sliding insignificantly, (rigs,).
 

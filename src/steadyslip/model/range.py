@@ -19,9 +19,9 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable, OutOfRangeWarning
 from steadyslip.core.expressions import ArrayFunction, Choose, occurrences
-from steadyslip.core.questions import question
 from steadyslip.model.eigenvalues import coefficients_from_eigenvalues, digits_lost, eigenvalues_of
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import (
@@ -40,7 +40,7 @@ _REDUCED_DECADES = (0.75, 0.5, 0.25, 0.0)
 """Factors on the decimal exponent of a parameter by which its influence on the range is tested; chosen by trial."""
 
 
-@question
+@cached
 def characteristic(point: OperatingPoint) -> Array:
     """Coefficients of the characteristic polynomial, (..., n+1), lowest power first; NaN without steady sliding."""
     if not is_written_out(point.model):
@@ -48,7 +48,7 @@ def characteristic(point: OperatingPoint) -> Array:
     return stacked(point.evaluate(_coefficient_function(point.model)), point)
 
 
-@question
+@cached
 def quasipolynomial(point: OperatingPoint) -> tuple[Array, Array]:
     """Characteristic quasipolynomial: polynomials in s times exp(−s delay), the one without delay first.
 
@@ -77,31 +77,31 @@ def delays_of(point: OperatingPoint) -> Array:
     return np.stack([np.broadcast_to(np.asarray(one, dtype=float), point.shape) for one in found], axis=-1)
 
 
-@question
+@cached
 def delays_in_terms(model: Model) -> NDArray[np.bool_]:
     """Table (m, d): True where a term of the quasipolynomial is delayed by a delay of the equations."""
     return np.array([[own in late for own in model.delays] for late in delays_of_terms(model)], dtype=bool)
 
 
-@question
+@cached
 def _term_functions(model: Model) -> tuple[int, ArrayFunction]:
     terms = characteristic_terms(model)
     return len(terms[0].coefficients), model.function([c for term in terms for c in term.coefficients])
 
 
-@question
+@cached
 def _coefficient_function(model: Model) -> ArrayFunction:
     return model.function(characteristic_coefficients(model))
 
 
-@question
+@cached
 def _steady_function(model: Model) -> ArrayFunction:
     """Array function of the steady friction stresses, memory variables and states."""
     frictions = [model.steady[contact.friction] for contact in model.contacts]
     return model.function([*frictions, *(model.steady[item.symbol] for item in (*model.memory, *model.states))])
 
 
-@question
+@cached
 def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
     """True for each rig whose values and slopes of the equations in steady sliding are finite, shape of the point.
 
@@ -146,7 +146,7 @@ def surely_in_range(point: OperatingPoint, complete: bool) -> bool:
     )
 
 
-@question
+@cached
 def _is_rational(model: Model) -> bool:
     """True if the slopes consist of sums, products and integer powers only."""
     nodes = occurrences(e for row in characteristic_rows(model).values() for entry in row for e in entry.values())
@@ -326,7 +326,7 @@ def _loses_generic_degree(point: OperatingPoint) -> NDArray[np.bool_]:
     return lost
 
 
-@question
+@cached
 def _matrix_function(model: Model) -> tuple[ArrayFunction, list[tuple[int, int, int, bool]], int]:
     """Array function of pairs of entries of the characteristic matrix; row, column, power and delay of each; size."""
     rows = list(characteristic_rows(model).values())
@@ -350,7 +350,7 @@ def _pairs(expressions: Sequence[Any]) -> list[Pair]:
     return [(sp.sympify(e).xreplace(zeroed), sp.sympify(e).xreplace(bounded)) for e in expressions]
 
 
-@question
+@cached
 def _exponents(model: Model) -> ArrayFunction:
     """Array function of the exponents of all exponentials in the characteristic equation."""
     if is_written_out(model):
@@ -360,6 +360,6 @@ def _exponents(model: Model) -> ArrayFunction:
     return model.function([node.args[0] for node in _exponentials(found)])
 
 
-@question
+@cached
 def _highest_function(model: Model) -> ArrayFunction:
     return model.function([e for level in highest_coefficients(model) for pair in level for e in pair])

@@ -25,9 +25,9 @@ from collections.abc import Iterator
 
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import InternalError, NotAvailable
 from steadyslip.core.expressions import derivative, replaced
-from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model.dead_time import USUAL_ORDER
@@ -49,7 +49,7 @@ STANDSTILL = -200
 the third stay below 1e308."""
 
 
-@question
+@cached
 def reduce_model(
     model: Model,
     eliminate: int | tuple[int | None, ...] | None = 0,
@@ -82,7 +82,7 @@ def reduce_model(
     return _Reducer(model, pushes, presses).reduction(each)
 
 
-@question
+@cached
 def can_eliminate(model: Model, index: int, which: int) -> bool:
     """True if memory variable `which` of contact `index` can be eliminated by the balance of forces."""
     model = model if model.for_motion is None else model.for_motion(USUAL_ORDER)

@@ -11,9 +11,9 @@ from functools import cached_property
 
 import sympy as sp
 
+from steadyslip.core.caching import HasCache
 from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import derivative
-from steadyslip.core.questions import Keeper
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.equations import TIME, V_LP, Model, P, Q
 from steadyslip.model.kinematics import VelocityVariable, W, single_variable
@@ -68,7 +68,7 @@ class Sliding:
 
 
 @dataclass(frozen=True, eq=False)
-class Reduction(Keeper):
+class Reduction(HasCache):
     """Explicit rates of a Model; expressions contain `state`, `inputs`, `slopes`, parameters and `unknowns` only.
 
     Attributes

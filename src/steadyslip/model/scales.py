@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import FEW, ArrayFunction, Choose, derivative
-from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import SPEED, Reduction
@@ -19,7 +19,7 @@ from steadyslip.model.weights import Weights, slip_rates, weight_expressions, we
 _LEAST_DIRECT_SHARE = 1e-7  # lower bound of the direct effect in scales, relative to normal stress; chosen by trial
 
 
-@question
+@cached
 def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping[str, Any], tuple[Any, ...]]:
     """Typical size of each state variable, by name, and of each unknown of `Reduction.searched` (at least one value).
 
@@ -49,7 +49,7 @@ def memory_scales(point: OperatingPoint) -> dict[str, float]:
     return {one.name: x if 0 < x < np.inf else 1.0 for one, x in zip(memory, sizes, strict=True)}
 
 
-@question
+@cached
 def _single_function(model: Model) -> ArrayFunction:
     """Array function of a slider's slip rate and weights."""
     return model.function([model.steady[model.contact.velocity], *weight_expressions(model)])
@@ -90,7 +90,7 @@ def scale_expressions(model: Model) -> list[sp.Expr]:
     return [model.at_steady(e) for e in (*wanted, *(contact.area for contact in model.contacts))]
 
 
-@question
+@cached
 def _moving_function(model: Model) -> ArrayFunction:
     return model.function(scale_expressions(model))
 

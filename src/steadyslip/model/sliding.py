@@ -8,11 +8,11 @@ from typing import overload
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
-from steadyslip.core.questions import question
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
@@ -147,7 +147,7 @@ def observed_in_steady_sliding(model: Model) -> tuple[list[str], list[sp.Expr]]:
     return names, [model.observables[name][0].xreplace(model.steady) for name in names]
 
 
-@question
+@cached
 def _observable_function(model: Model) -> tuple[list[str], ArrayFunction]:
     names, expressions = observed_in_steady_sliding(model)
     return names, model.function(expressions)
@@ -237,7 +237,7 @@ def friction_coefficient(model: Model, place: int) -> sp.Expr:
     return sp.sympify(model.steady[contact.friction] / contact.sigma_ss)
 
 
-@question
+@cached
 def _friction_function(model: Model, place: int) -> ArrayFunction:
     return model.function([friction_coefficient(model, place)])
 

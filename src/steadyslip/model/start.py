@@ -8,22 +8,22 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import InternalError, ParameterError, Problem, QuantityError, repr_short, unknown_name
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.quantities import in_si
-from steadyslip.core.questions import question
 from steadyslip.model.equations import HELD, Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import V_LP, Reduction
 from steadyslip.model.weights import slip_rates
 
 
-@question
+@cached
 def _steady_memory(model: Model) -> ArrayFunction:
     return model.function(model.steady[item.symbol] for item in model.memory)
 
 
-@question
+@cached
 def _continuous_names(reduction: Reduction) -> tuple[str, ...]:
     """Names of `Reduction.continuous`; velocity variables are ``w`` and the index of the contact."""
     by_symbol = {item.symbol: item.name for item in reduction.model.variables}
@@ -31,7 +31,7 @@ def _continuous_names(reduction: Reduction) -> tuple[str, ...]:
     return tuple(by_symbol[symbol] for symbol in reduction.continuous)
 
 
-@question
+@cached
 def _steady_memory_values(point: OperatingPoint) -> list[Any]:
     """Steady values of the memory variables, cached per point."""
     return point.evaluate(_steady_memory(point.model))
@@ -42,7 +42,7 @@ def _number(value: Any) -> Any:
     return np.asarray(value, dtype=float)[()]
 
 
-@question
+@cached
 def _velocity_variable(reduction: Reduction, index: int) -> ArrayFunction:
     """Array function of a contact's velocity variable from its slip rate and all memory variables."""
     model, variable = reduction.model, reduction.slidings[index].variable
@@ -52,7 +52,7 @@ def _velocity_variable(reduction: Reduction, index: int) -> ArrayFunction:
     return model.function([variable.w_of_v], model.contacts[index].velocity, *memory)
 
 
-@question
+@cached
 def slip_rates_at(model: Model) -> ArrayFunction:
     """Array function of slip rates from velocities of the coordinates, with the load point at its steady velocity."""
     steady = {model.inputs["load_velocity"]: model.steady[model.inputs["load_velocity"]]}
@@ -60,19 +60,19 @@ def slip_rates_at(model: Model) -> ArrayFunction:
     return model.function([e.xreplace(steady) for e in slips], *(one.velocity for one in model.coordinates))
 
 
-@question
+@cached
 def _steady_states(model: Model) -> ArrayFunction:
     """Array function of the steady states of contact laws."""
     return model.function(model.steady[item.symbol] for item in model.states)
 
 
-@question
+@cached
 def coordinate_speeds(model: Model) -> ArrayFunction:
     """Array function of the velocities of the coordinates in steady sliding."""
     return model.function(one.speed for one in model.coordinates)
 
 
-@question
+@cached
 def _drive_force(model: Model) -> ArrayFunction:
     """Array function of the drive's force caused by its motion, minus that of steady sliding, before the protocol."""
     own, moves = model.letting_go, model.inputs["load_velocity"]
@@ -81,7 +81,7 @@ def _drive_force(model: Model) -> ArrayFunction:
     return model.function([force], *given, *(item.symbol for item in model.integrals))
 
 
-@question
+@cached
 def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
     """Balance of a massless slider before the protocol and its slope in one memory variable; True if it is linear."""
     model = reduction.model
@@ -120,7 +120,7 @@ def initial_values(
     return columns.copy(), velocity.copy()
 
 
-@question
+@cached
 def _steady_start(point: OperatingPoint, reduction: Reduction) -> tuple[np.ndarray, np.ndarray]:
     """Initial values for steady sliding, cached per point."""
     return _initial_values(reduction, point, {})
@@ -229,13 +229,13 @@ def guesses(reduction: Reduction, point: OperatingPoint, initial: np.ndarray, ve
     return found or [0.0]
 
 
-@question
+@cached
 def _steady_unknowns(reduction: Reduction) -> ArrayFunction:
     """Array function of steady values of `Reduction.searched`; zero for velocity variables."""
     return reduction.model.function(reduction.model.steady.get(s, sp.Integer(0)) for s in reduction.searched)
 
 
-@question
+@cached
 def restored_of(reduction: Reduction) -> ArrayFunction:
     """Array function of the continuous variables from state and inputs, to start a kernel at any state."""
     return reduction.model.function(reduction.restored, *reduction.state, *reduction.inputs)

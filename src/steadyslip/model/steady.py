@@ -16,9 +16,9 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, derivative
-from steadyslip.core.questions import question
 from steadyslip.model.equations import Carried, Entries, Model
 
 Arguments = tuple[Any, ...]
@@ -46,7 +46,7 @@ class SteadyEquation:
     slope: sp.Expr | None = None
 
 
-@question
+@cached
 def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
     """Equation of the steady normal stress of a contact, by its index, or of a slider's contact.
 
@@ -238,7 +238,7 @@ def solve_all_or_nan(matrix: Array, right: Array) -> Array:
         return np.asarray(np.where(bad[..., None, None], np.nan, found))
 
 
-@question
+@cached
 def joint_equation(model: Model) -> JointEquation | None:
     """Equations of coupled steady normal stresses; None if no contact depends on another.
 

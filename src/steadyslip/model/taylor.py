@@ -15,8 +15,8 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction, derivative
-from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import delays_of
@@ -66,7 +66,7 @@ class System:
         return self.unknowns.index(symbol)
 
 
-@question
+@cached
 def system(model: Model) -> System:
     """Differentiate a Model three times at steady sliding.
 

@@ -11,14 +11,14 @@ from dataclasses import replace
 
 import sympy as sp
 
-from steadyslip.core.questions import question
+from steadyslip.core.caching import cached
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.reduction import Reduction
 
 Column = tuple[sp.Symbol, ...]
 
 
-@question
+@cached
 def with_sensitivities(reduction: Reduction) -> Reduction:
     """Reduction whose state is y, then S column by column, then D in one direction."""
     n = len(reduction.state)
@@ -26,7 +26,7 @@ def with_sensitivities(reduction: Reduction) -> Reduction:
     return _extended(reduction, columns, (_column("D", n),))
 
 
-@question
+@cached
 def with_directions(reduction: Reduction, count: int) -> Reduction:
     """Reduction whose state is y, then D in each of `count` directions."""
     return _extended(reduction, (), tuple(_column(f"D_{k}", len(reduction.state)) for k in range(count)))

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction, derivative
-from steadyslip.core.questions import question
 from steadyslip.core.results import ReadOnly
 from steadyslip.model.equations import Model
 from steadyslip.model.kinematics import kinematics
@@ -85,12 +85,12 @@ def _balance_slopes(model: Model, index: int) -> list[sp.Expr]:
     return [derivative(balance, place.displacement) / share, fixed + friction]
 
 
-@question
+@cached
 def _weights_function(model: Model, index: int) -> ArrayFunction:
     return model.function(weight_expressions(model, index))
 
 
-@question
+@cached
 def weights(point: OperatingPoint, index: int = 0) -> Weights:
     """Derivatives in steady sliding at contact `index`, for all rigs of a point."""
     found = _weights_function(point.model, index)(*arrays_of(point))
@@ -102,19 +102,19 @@ def arrays_of(point: OperatingPoint) -> list[np.ndarray]:
     return [*map(np.asarray, point.arguments), *map(np.atleast_1d, point.steady)]
 
 
-@question
+@cached
 def slip_rates(point: OperatingPoint) -> tuple[Any, ...]:
     """Slip rate of every contact in steady sliding (m/s)."""
     model = point.model
     return tuple(point.evaluate(_slip_rates(model)))
 
 
-@question
+@cached
 def _slip_rates(model: Model) -> ArrayFunction:
     return model.function(model.steady[contact.velocity] for contact in model.contacts)
 
 
-@question
+@cached
 def eliminable(point: OperatingPoint) -> int | tuple[int | None, ...] | None:
     """Index of the memory variable to eliminate: the one with the largest weight in friction that can be.
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import INTEGRATION
-from steadyslip.core.questions import question
 from steadyslip.core.records import with_values
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.layout import Setting
@@ -193,7 +193,7 @@ def _settings(point: OperatingPoint, machine: Runner, reduction: Reduction, opti
     return settings
 
 
-_cached_settings = question(_settings)
+_cached_settings = cached(_settings)
 
 
 def numbers(drive: Any, stress: Any, x: Any, unknown: Any, options: Options) -> dict[str, Any]:
@@ -284,7 +284,7 @@ def prepare(
     return Jobs(point, segments, start, velocity, reduction, eliminate, options, size, acting, let_go=let_go)
 
 
-@question
+@cached
 def _taken_up_by(model: Model) -> ArrayFunction:
     """Stiffness of the element that carries the force of a drive that is let go."""
     return model.function([] if model.letting_go is None else [model.letting_go.stiffness])

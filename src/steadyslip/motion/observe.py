@@ -6,9 +6,9 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import question
 from steadyslip.kernels.runner import Runner
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model import Model
@@ -102,7 +102,7 @@ def _given(model: Model) -> dict[sp.Symbol, str]:
     return given
 
 
-@question
+@cached
 def _function(model: Model) -> tuple[list[str], list[str], ArrayFunction]:
     """Names of computed observables, names of their arguments, and the function from these to those."""
     given = _given(model)
@@ -167,7 +167,7 @@ def observe(
     return found
 
 
-@question
+@cached
 def _load_point_lead(model: Model) -> ArrayFunction:
     """Displacement of a let-go drive's load point ahead of steady motion, and its rate."""
     own = model.letting_go
@@ -203,7 +203,7 @@ def _at_contacts(model: Model, values: Array) -> dict[str, Array]:
     return found
 
 
-@question
+@cached
 def _shares(model: Model) -> ArrayFunction:
     """Slip rates of contacts and speeds of coordinates in steady sliding, over the velocity of the drive."""
     drive = model.steady[model.inputs["load_velocity"]]
@@ -211,7 +211,7 @@ def _shares(model: Model) -> ArrayFunction:
     return model.function(speed / drive for speed in (*speeds, *(one.speed for one in model.coordinates)))
 
 
-@question
+@cached
 def _slips(model: Model) -> ArrayFunction:
     return model.function([c.slip for c in model.contacts], *(one.displacement for one in model.coordinates))
 

@@ -99,7 +99,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     @property
     def nudge(self) -> tuple[str, str]:
         """Pieces of a protocol, as text: the drive is faster by a tenth for a tenth of the run, then as before."""
-        value, unit = self.rig.told("drive.velocity", float(self.rig.drive.velocity))
+        value, unit = self.rig.display_value("drive.velocity", float(self.rig.drive.velocity))
         begin, end = (format_quantity(share * self.end, "s") for share in (NUDGED, 2 * NUDGED))
         faster = format_quantity(FASTER * value, unit)
         return f"velocity-step at='{begin}' to='{faster}'", f"velocity-step at='{end}' to='{value!r} {unit}'"

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import DURATION, TIMES, checked
-from steadyslip.core.questions import question
 from steadyslip.kernels.layout import Final, Recorded, Sampled
 from steadyslip.kernels.runner import TALLY, Runner
 from steadyslip.machine.input_units import in_units_of
@@ -223,12 +223,12 @@ def _history(
     )
 
 
-@question
+@cached
 def _surfaces(point: OperatingPoint) -> tuple[float, ...]:
     return tuple(float(area) for area in point.evaluate(areas(point.model)))
 
 
-@question
+@cached
 def areas(model: Model) -> ArrayFunction:
     """Function for the areas of the contacts, m²; forces are stresses times areas."""
     return model.function(contact.area for contact in model.contacts)

@@ -19,7 +19,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.pictures import draw
 from steadyslip.core.records import FrozenRecord, parameters
-from steadyslip.core.written import si_units, told_as
+from steadyslip.core.written import displayed_as, si_units
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import figure_html
 from steadyslip.machine.machine import Machine
@@ -195,8 +195,8 @@ def _record_html(record: FrozenRecord) -> Iterator[str]:
             if values.ndim:
                 words = _format_array(values, one.role.unit, area)
             elif isinstance(record, Rig):
-                with told_as(record.written_as(path)):
-                    words = format_quantity(*record.told(path, float(values)), 6, area)
+                with displayed_as(record.written_as(path)):
+                    words = format_quantity(*record.display_value(path, float(values)), 6, area)
             else:
                 words = format_quantity(float(values), one.role.unit, 6)
             rows.append((path, words, stress_name(one.role.doc, area)))

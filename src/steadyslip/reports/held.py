@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.format import format_quantity
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 from steadyslip.machine.rig import Rig
 from steadyslip.nonlinear.hunting.hunt import hunt
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
@@ -136,7 +136,9 @@ def _changed(result: Hunt) -> Iterator[tuple[str, Any, float]]:
         if one.value and known[sliding].value and one.value > known[sliding].value
     }
     if rest:
-        lower = " and ".join(f"{said(rig, name)} from {known[name].value:.4g} to {to:.4g}" for name, to in rest.items())
+        lower = " and ".join(
+            f"{label_of(rig, name)} from {known[name].value:.4g} to {to:.4g}" for name, to in rest.items()
+        )
         yield (
             f"friction at rest no larger than in sliding ({lower}), by other guides or oil",
             rig.with_values(rest),
@@ -149,11 +151,11 @@ def _changed(result: Hunt) -> Iterator[tuple[str, Any, float]]:
         yield words, replace(rig, drive=replace(rig.drive, dead_band=measured, dead_band_of="integral")), band
     gains = {name: STIFFER * one.value for name, one in known.items() if _is_gain(rig, name) and one.value}
     if gains:
-        names = ", ".join(said(rig, name) for name in gains)
+        names = ", ".join(label_of(rig, name) for name in gains)
         yield f"a stiffer controller, all gains times {STIFFER:g} ({names})", rig.with_values(gains), 0.0
     for name, one in known.items():
         if one.role.letter == "k_i" and one.value:
-            yield f"no integral ({said(rig, name)} = 0)", rig.with_values({name: 0.0}), 0.0
+            yield f"no integral ({label_of(rig, name)} = 0)", rig.with_values({name: 0.0}), 0.0
 
 
 def _is_gain(rig: Rig, name: str) -> bool:

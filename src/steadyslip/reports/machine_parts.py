@@ -8,7 +8,7 @@ from steadyslip import figures
 from steadyslip.core.format import format_quantity
 from steadyslip.figures.inline import column_html, figure_html
 from steadyslip.figures.machine_verdict import undrawn_edges
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 from steadyslip.reports import rig as rig_report
 from steadyslip.reports.brief import sketch_of
 from steadyslip.reports.document import Parts
@@ -57,7 +57,7 @@ def _settable_edge(analysis: Analysis) -> str:
 def _verdict_figure(analysis: Analysis) -> str:
     words = "Where it is stable in each parameter, how it moves in its leading mode, and its eigenvalues."
     if far := undrawn_edges(analysis):
-        names = ", ".join(said(analysis.rig, name) for name in far)
+        names = ", ".join(label_of(analysis.rig, name) for name in far)
         words += (
             f" Not drawn, but named below, {'are the edges' if len(far) > 1 else 'is the edge'} of {names}: a factor "
             "of 100 away or more, or not of a positive value."

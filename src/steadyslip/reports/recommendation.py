@@ -15,7 +15,7 @@ from steadyslip.linear.boundary import Margin
 from steadyslip.linear.nearness import doublings
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.status import stability
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 from steadyslip.reports.elements import heading, paragraph, table, why
 from steadyslip.verdict import Cures, StableWithin, Tolerated, Window, analyze, cure, stable_within
 from steadyslip.verdict.analysis import Analysis
@@ -92,7 +92,7 @@ def recommendation(
         return
     rows.sort(key=_best_first)
     yield from _made_stable(analysis, rows, {one.parameter: begun for one, begun in found.items()})
-    if close and (far := [said(analysis.rig, one.parameter) for one in found if one not in close]):
+    if close and (far := [label_of(analysis.rig, one.parameter) for one in found if one not in close]):
         yield _left_out(far)
 
 
@@ -137,7 +137,7 @@ def _made_certain(
     for one in anywhere.each:
         values = str(one).partition(": ")[2]
         yield paragraph(
-            f"It is not known how large {said(rig, one.parameter)} is: {values}. Wanted is what holds for all."
+            f"It is not known how large {label_of(rig, one.parameter)} is: {values}. Wanted is what holds for all."
         )
     reached = "stable" if tolerated is None else f"stable in {format_percent(SURE)} of all that are built"
     tolerances = {} if tolerated is None else tolerated.tolerances
@@ -157,7 +157,7 @@ def _made_sure(analysis: Analysis, tolerated: Tolerated, adjustable: Mapping[str
     )
     telling = [one for one in tolerated.alone if one.share >= LEAST]
     if 0 < tolerated.share < 1 and telling:
-        name, part = said(tolerated.rig, telling[0].parameter), format_percent(round(telling[0].share, 2))
+        name, part = label_of(tolerated.rig, telling[0].parameter), format_percent(round(telling[0].share, 2))
         yield paragraph(
             f"Before anything is changed it may be worth measuring {name}: of all tolerances, that of this value "
             f"decides most ({part} of the variance of the verdict)."
@@ -175,7 +175,7 @@ def _within(tolerated: Tolerated) -> str:
     text = f"No {kind} within the tolerances is stable {tried}"
     if tolerated.otherwise:
         values = (
-            f"{said(rig, name)} {format_parameter(rig, name, value)}" for name, value in tolerated.otherwise.items()
+            f"{label_of(rig, name)} {format_parameter(rig, name, value)}" for name, value in tolerated.otherwise.items()
         )
         return f"{text}, but for one at their very end: {', '.join(values)}."
     return f"{text}."
@@ -219,7 +219,9 @@ def _cured(
         yield paragraph("These values are edges: go beyond them as far as you can.")
     if named is not None and named.parameter not in (adjustable or present):
         which = "one of friction, " if "friction." in named.parameter else ""
-        yield paragraph(f"The nearest edge is {which}that of {said(rig, named.parameter)}, which is not changed here.")
+        yield paragraph(
+            f"The nearest edge is {which}that of {label_of(rig, named.parameter)}, which is not changed here."
+        )
     yield from _windows(found, at, bool(adjustable))
 
 
@@ -231,7 +233,7 @@ def _left_out(far: Sequence[str]) -> str:
 
 
 def _moved(rig: Any, window: Window, to: float | None) -> str:
-    return f"{said(rig, window.parameter)} from {window.written(window.value)} to {window.written(to or 0.0)}"
+    return f"{label_of(rig, window.parameter)} from {window.written(window.value)} to {window.written(to or 0.0)}"
 
 
 def _windows(found: Cures, at: str, whole: bool) -> Iterator[str]:
@@ -242,16 +244,16 @@ def _windows(found: Cures, at: str, whole: bool) -> Iterator[str]:
     rig: Any = found.rig
     every = sorted((one for one in found.windows if one.windows), key=lambda one: one.cost)
     able = [one for one in every if whole or one.nearest is None or not _is_far(one.value, one.nearest)] or every
-    rows = [(said(rig, one.parameter), one.written(one.value), str(one), f"{one.cost:.2g}") for one in able]
+    rows = [(label_of(rig, one.parameter), one.written(one.value), str(one), f"{one.cost:.2g}") for one in able]
     words = "Values that are enough, each alone, the others unchanged, the cheapest first. "
     cost = (
         f"Doubling or halving a setting of the drive costs {SETTING:g}, a part {PART:g}, the speed, which is the task, "
         f"{TASK:g}, unless the rig file gives another cost."
     )
     yield table(rows, ("change", "now", at, "cost"), caption=words + cost)
-    if far := [said(rig, one.parameter) for one in every if one not in able]:
+    if far := [label_of(rig, one.parameter) for one in every if one not in able]:
         yield _left_out(far)
-    if without := [said(rig, one.parameter) for one in found.windows if not one.windows]:
+    if without := [label_of(rig, one.parameter) for one in found.windows if not one.windows]:
         yield paragraph(f"Not enough alone, whatever the value within range: {', '.join(without)}.", "small")
 
 
@@ -309,7 +311,7 @@ def _kept_apart(
     """HTML of the edges `near` to a stable rig, and of changes that move the rig away from them."""
     rig, wanted = analysis.rig, format_percent(BEYOND_EDGE)
     listed = ", ".join(
-        f"{said(rig, one.parameter)} at {_value(analysis, one, edge.value)} ({change_to(one, edge)})"
+        f"{label_of(rig, one.parameter)} at {_value(analysis, one, edge.value)} ({change_to(one, edge)})"
         for one, edge in near
     )
     whose = "their values are the edges" if len(near) > 1 else "its value is the edge"
@@ -383,10 +385,10 @@ def _tried(analysis: Analysis, margin: Margin, values: Sequence[float]) -> list[
                 continue
             edges = [(_distance(one, edge), one) for one in changed.margins for edge in one.about]
             away, of = min(edges, key=lambda found: found[0], default=(math.inf, None))
-            near = "" if of is None else said(rig, of.parameter)
+            near = "" if of is None else label_of(rig, of.parameter)
             near += f", {format_percent(away)} away" if math.isfinite(away) else ""
             first, then = (_value(analysis, margin, value) for value in (margin.value, to))
-            found.append(_Moved(margin.parameter, (said(rig, margin.parameter), first, then), changed, near, away))
+            found.append(_Moved(margin.parameter, (label_of(rig, margin.parameter), first, then), changed, near, away))
             if away >= BEYOND_EDGE:
                 break
     return found
@@ -404,7 +406,7 @@ def _side(analysis: Analysis, margin: Margin) -> str:
     edge = margin.edge.value if margin.edge else math.nan
     side = "below" if edge > margin.value else "above"
     now, end = (_value(analysis, margin, value) for value in (margin.value, edge))
-    return f"{said(analysis.rig, margin.parameter)}, now {now}: keep it {side} {end}"
+    return f"{label_of(analysis.rig, margin.parameter)}, now {now}: keep it {side} {end}"
 
 
 def _curing(margin: Margin) -> list[Boundary]:

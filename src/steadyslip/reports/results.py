@@ -18,7 +18,7 @@ from steadyslip.experiments import Fit, Population, predict
 from steadyslip.figures.hunting import hunting
 from steadyslip.figures.inline import figure_html
 from steadyslip.figures.maps import MAX_FACETS
-from steadyslip.machine.letters import said, worded
+from steadyslip.machine.letters import label_of, worded
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
@@ -140,7 +140,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
     known = result.rig.parameters()
     ranges = [
         (
-            said(result.rig, name),
+            label_of(result.rig, name),
             format_range(low, high, known[name].role.unit, result.rig.printed_area(name)),
             spacing,
             known[name].role.doc,
@@ -157,7 +157,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
         for parameter in result.ranked(name):
             i = result.parameters.index(parameter)
             (least, most), (low, high) = result.first_interval[name][:, i], result.total_interval[name][:, i]
-            rows.append((said(result.rig, parameter), f"{result.first[name][i]:.3f}", f"{least:.3f} to {most:.3f}",
+            rows.append((label_of(result.rig, parameter), f"{result.first[name][i]:.3f}", f"{least:.3f} to {most:.3f}",
                          f"{result.total[name][i]:.3f}", f"{low:.3f} to {high:.3f}"))  # fmt: skip
         columns = ("parameter", "alone", "95 %", "with others", "95 %")
         body += [
@@ -171,7 +171,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
     if result.interrupted:
         body.append(paragraph("It was stopped before all points were done.", "warning"))
     (first, *_), question = result.first, "Which parameters decide, over the ranges below?"
-    head = f"{said(result.rig, result.ranked(first)[0])} decides most about the {first.replace('_', ' ')}"
+    head = f"{label_of(result.rig, result.ranked(first)[0])} decides most about the {first.replace('_', ' ')}"
     return Parts(head, "", question, body, result.rig)
 
 
@@ -268,7 +268,7 @@ def _changes(result: Cures) -> Iterator[str]:
     rig = result.rig
     if result.chance >= result.sure:
         rows = [
-            (said(rig, one.parameter), one.written(one.value), " or ".join(map(one.written, ends)))
+            (label_of(rig, one.parameter), one.written(one.value), " or ".join(map(one.written, ends)))
             for one, ends in result.losses().items()
         ]
         yield (
@@ -277,7 +277,12 @@ def _changes(result: Cures) -> Iterator[str]:
         return
     for several, words in ((result.windows, "may be changed"), (result.unlisted, "are not listed as adjustable")):
         found = [
-            (said(rig, one.parameter), one.written(one.value), str(one), f"{one.cost:.3g}" if one.windows else "none")
+            (
+                label_of(rig, one.parameter),
+                one.written(one.value),
+                str(one),
+                f"{one.cost:.3g}" if one.windows else "none",
+            )
             for one in several
         ]
         if found:
@@ -350,7 +355,7 @@ def _branch(result: CycleBranch) -> Parts:
     along, unit, area = result.along, result.unit, result.rig.printed_area(result.along)
     swings, of = result.swings()
     first, _, rest = str(result).partition("\n")
-    words = said(result.rig, along)
+    words = label_of(result.rig, along)
     rows = [
         (format_quantity(one.value, unit, area=area), format_quantity(one.period, "s"),
          format_quantity(one.peak_velocity, "m/s"),
@@ -413,10 +418,10 @@ def _map_figures(result: MapResult) -> Iterator[str]:
     """HTML figure of a map over its first two parameters: a panel for each value of a third, or at the rig's values."""
     rig, others = result.rig, [name for name in result.dims if name != "sample"][2:]
     if len(others) == 1 and len(result.read(others[0])) <= MAX_FACETS:
-        words = f"One picture for each value of {said(rig, others[0])}."
+        words = f"One picture for each value of {label_of(rig, others[0])}."
         yield figure(figure_html(lambda: result.plot(facet=others[0]), words), words)
         return
-    held = f"At the rig's own {', '.join(said(rig, name) for name in others)}, or next to it." if others else ""
+    held = f"At the rig's own {', '.join(label_of(rig, name) for name in others)}, or next to it." if others else ""
     yield figure(figure_html(lambda: result.plot(), "map", 6.5), held)
 
 

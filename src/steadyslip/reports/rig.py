@@ -15,13 +15,13 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_own, format_quantity
 from steadyslip.core.records import Address, choices
 from steadyslip.core.roles import PARAMETER_KINDS
-from steadyslip.core.written import told_as
+from steadyslip.core.written import displayed_as
 from steadyslip.experiments import Prediction
 from steadyslip.figures.inline import column_html, figure_html
 from steadyslip.linear.boundary import REMOTE
 from steadyslip.linear.formula import formula_in_parts
 from steadyslip.linear.stiffness import STIFFNESS
-from steadyslip.machine.letters import MEMBERS, letter_of, said, worded, words_of
+from steadyslip.machine.letters import MEMBERS, label_of, letter_of, worded, words_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
@@ -101,8 +101,8 @@ def input_table(
     for name, letter in letters_of_inputs.items():
         one = inputs[name]
         known = inline_math(sp.Symbol(letter))
-        number, of = rig.told(name, float(one.value or 0.0))
-        with told_as(rig.written_as(name)):
+        number, of = rig.display_value(name, float(one.value or 0.0))
+        with displayed_as(rig.written_as(name)):
             text = format_own(number, of, rig.printed_area(name))
         rows.append(
             (
@@ -118,21 +118,22 @@ def input_table(
         if not usual or name in notes:
             chosen = "yes" if value is True else "no" if value is False else str(value)
             both = *(("",) if tolerances else ()), *((_remark(notes, name),) if notes else ())
-            rows.append((said(rig, name), "", chosen, choice.doc, *both))
+            rows.append((label_of(rig, name), "", chosen, choice.doc, *both))
     more = (*(("tolerance",) if tolerances else ()), *(("source or remark",) if notes else ()))
     words = "Inputs." if tolerances or tolerances is None else "Inputs. Tolerances: none given."
     own = [name for name in letters_of_inputs if name.partition(".")[0] in MEMBERS]
     if shared := [one for one in own if letters_of_inputs[one].endswith(f"_{subscript_of(one)}")]:
-        example = f"{said(rig, shared[0])} for {letters_of_inputs[shared[0]]}"
+        example = f"{label_of(rig, shared[0])} for {letters_of_inputs[shared[0]]}"
         words += f" Behind the name of a member its letter stands without the subscript: {example}."
     return table(rows, ("input", "letter", "value", "meaning", *more), caption=words)
 
 
 def _fed_body(rig: Slider | Machine, name: str) -> str:
     """Clause on the body to which the printed drive speed refers, and on the speed in the equations; empty if equal."""
-    if not isinstance(rig, Machine) or name != "drive.velocity" or rig.told(name, 1.0) == Rig.told(rig, name, 1.0):
+    in_si = Rig.display_value(rig, name, 1.0)
+    if not isinstance(rig, Machine) or name != "drive.velocity" or rig.display_value(name, 1.0) == in_si:
         return ""
-    own = format_quantity(*Rig.told(rig, name, float(rig.drive.velocity)))
+    own = format_quantity(*Rig.display_value(rig, name, float(rig.drive.velocity)))
     return f", that of {rig.fed}; in the equations it is that of {rig.drive.driven() or 'the load point'}, {own}"
 
 
@@ -156,12 +157,12 @@ def edge_table(analysis: Analysis) -> Iterator[str]:
     if rows := [row for one in analysis.margins if not one.remote for row in edge_rows(analysis, one)]:
         head = ("parameter", "now", "edge", "change", "beyond it")
         yield paragraph("The nearest edges in each parameter, below and above it, the others unchanged.")
-        yield table(((said(rig, name), *rest) for name, *rest in rows), head, caption="Nearest edges.")
+        yield table(((label_of(rig, name), *rest) for name, *rest in rows), head, caption="Nearest edges.")
     if far:
         words = EDGE_WORDS["far"].format(remote=REMOTE).capitalize()
-        yield paragraph(f"{words}: {', '.join(said(rig, name) for name in far)}.", "small")
+        yield paragraph(f"{words}: {', '.join(label_of(rig, name) for name in far)}.", "small")
     if without:
-        names = ", ".join(said(rig, name) for name in without)
+        names = ", ".join(label_of(rig, name) for name in without)
         yield paragraph(f"No edge within range: {names}.", "small")
 
 
@@ -189,7 +190,7 @@ def charts_over(analysis: Analysis, order: Order) -> Iterator[str]:
     """HTML charts of stability over the pairs in `order.charts`, by default over `chart_pairs`."""
     rig = analysis.rig
     for x, y in order.charts or chart_pairs(analysis, order):
-        over = " and ".join(said(rig, rig.resolve(name)) for name in (x, y))
+        over = " and ".join(label_of(rig, rig.resolve(name)) for name in (x, y))
         words = f"Where sliding is stable over {over}; the dot is this {'machine' if rig.in_forces else 'rig'}."
         chart = column_html(lambda x=x, y=y: figures.stability_chart(rig, x, y, points=101), words)  # type: ignore[misc]
         yield figure(chart, words)
@@ -199,7 +200,7 @@ def _chart_section(analysis: Analysis, order: Order) -> Iterator[str]:
     rig = analysis.rig
     drawn = list(charts_over(analysis, order))
     if analysis.stable is not None:
-        varied = "stiffness k along the slide" if rig.axial_stiffness else said(rig, rig.stiffness_name())
+        varied = "stiffness k along the slide" if rig.axial_stiffness else label_of(rig, rig.stiffness_name())
         words = f"Eigenvalues of small disturbances as {varied} varies; to the right of the axis they grow."
         drawn.append(figure(column_html(lambda: figures.root_locus(rig), "root locus"), words))
     if charts := beside(drawn):

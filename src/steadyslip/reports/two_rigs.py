@@ -8,7 +8,7 @@ from typing import Any
 
 from steadyslip.figures.inline import figure_html
 from steadyslip.figures.two_rigs import abscissa
-from steadyslip.machine.letters import said, worded
+from steadyslip.machine.letters import label_of, worded
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.reports.recommendation import Order, recommendation
@@ -68,7 +68,7 @@ def _answer(result: RigComparison) -> str:
     if not result.measure:
         return "No difference decides, as the verdict is the same."
     one = result.differences[0]
-    name = said(rig, one.parameter)
+    name = label_of(rig, one.parameter)
     part = f", by {result.part_in_words(one).replace('x ', 'a factor of ')} of {result.of}" if result.measure else ""
     return f"No difference decides, as the verdict is the same; most of what differs comes from {name}{part}."
 
@@ -79,13 +79,13 @@ def _differences(result: RigComparison) -> Iterator[str]:
     a, b = result.names
     known = bool(result.measure)
     rows = [
-        (said(rig, one.parameter), one.first, one.second, *([result.part_in_words(one)] if known else []),
+        (label_of(rig, one.parameter), one.first, one.second, *([result.part_in_words(one)] if known else []),
          one.first_with, one.second_with)
         for one in result.differences
     ]  # fmt: skip
     if not known:
         lost = [one.parameter for one in result.differences if IMPOSSIBLE in (one.first_with, one.second_with)]
-        such = f", as with the {' or '.join(said(rig, name) for name in lost)} of the other alone" if lost else ""
+        such = f", as with the {' or '.join(label_of(rig, name) for name in lost)} of the other alone" if lost else ""
         yield paragraph(
             f"How much each difference contributes is not told: that needs all mixtures of {a} and {b}, and some "
             f"cannot be built or do not slide steadily{such}. The last two columns tell what each does alone."
@@ -103,14 +103,14 @@ def _differences(result: RigComparison) -> Iterator[str]:
 def _chart(result: RigComparison) -> str:
     """HTML figure of the distance of both rigs from the edge, over a parameter in which they differ."""
     a, b = result.names
-    over = said(result.verdicts[0].rig, abscissa(result))
+    over = label_of(result.verdicts[0].rig, abscissa(result))
     words = f"How near {a} and {b} are to the edge of stability, over {over}; the marks are the rigs."
     return figure(figure_html(result.plot, words, 6.0), words)
 
 
 def _with_words(rigs: Sequence[Any], cells: Sequence[str]) -> Iterator[str]:
     """Cells of a row about two rigs, with dotted parameter names at their beginning replaced by words."""
-    yield next((said(rig, cells[0]) for rig in rigs if cells[0] in rig.parameters()), cells[0])
+    yield next((label_of(rig, cells[0]) for rig in rigs if cells[0] in rig.parameters()), cells[0])
     for rig, cell in zip(rigs, cells[1:], strict=True):
         name, _, rest = cell.partition(" ")
-        yield f"{said(rig, name)} {rest}" if name in rig.parameters() else cell
+        yield f"{label_of(rig, name)} {rest}" if name in rig.parameters() else cell

@@ -11,8 +11,8 @@ import mpmath
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.caching import HasCache, cached
 from steadyslip.core.expressions import ArrayFunction, derivative
-from steadyslip.core.questions import Keeper, question
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.testing.precise import call_with_symbols, precise_function, symbolic_copy
 
@@ -49,7 +49,7 @@ class Conditions:
 DEFAULT_CONDITIONS = Conditions()
 
 
-class SymbolicLaw(Keeper):
+class SymbolicLaw(HasCache):
     """Equations of a friction law as SymPy expressions, with their gradients and functions that evaluate them.
 
     The inputs of all expressions are v (m/s), σ (Pa), the memory variables and τ (Pa), in this order.
@@ -73,20 +73,20 @@ class SymbolicLaw(Keeper):
         """Steady strength τss(v, σ), Pa; evaluated late, as by default it needs the steady memory variables."""
         return call_with_symbols(self.law, "steady_strength", self._copy.steady_strength, self.v, self.sigma)
 
-    @question
+    @cached
     def function(self, *expressions: sp.Expr) -> Callable[..., list[mpmath.mpf]]:
         """Function of the inputs that returns the values of the expressions to fifty digits."""
         compiled = precise_function(self.law, [*self.inputs, *self.numbers], expressions)
         own = [mpmath.mpf(number) for number in self.numbers.values()]
         return lambda *numbers: compiled(*numbers, *own)
 
-    @question
+    @cached
     def floats(self, *expressions: sp.Expr) -> Callable[..., list[Any]]:
         """Function of the inputs that returns the values of the expressions in floats, compiled as for a Model."""
         compiled = ArrayFunction([*self.inputs, *self.numbers], expressions)
         return lambda *numbers: compiled(*numbers, *self.numbers.values())
 
-    @question
+    @cached
     def steady(self, v: float, sigma: float) -> tuple[mpmath.mpf, ...]:
         """Values of the inputs (v, σ, memory variables, τ) in steady sliding."""
         unused = [0] * (len(self.memory) + 1)
@@ -96,12 +96,12 @@ class SymbolicLaw(Keeper):
     def _steady(self) -> Callable[..., list[mpmath.mpf]]:
         return self.function(*self.steady_memory, self.steady_strength)
 
-    @question
+    @cached
     def gradient(self, expression: sp.Expr) -> tuple[sp.Expr, ...]:
         """Partial derivatives of an expression by each input."""
         return tuple(derivative(expression, name).doit() for name in self.inputs)
 
-    @question
+    @cached
     def relaxation(self) -> Callable[..., Any]:
         """Function of the inputs that returns the matrix d(rates)/d(memory) at fixed v and σ, with τ = strength."""
         slope = 1 - derivative(self.strength, self.tau)

@@ -17,9 +17,9 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from steadyslip.core.caching import cached
 from steadyslip.core.checks import UNDECIDED, Check, check
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import question
 from steadyslip.laws.friction.law import FrictionLaw
 from steadyslip.linear.allowance import at_most
 from steadyslip.linear.boundary import Margin, without_edges
@@ -118,7 +118,7 @@ def net_forces(rig: Rig, steady: SteadyMachine) -> dict[str, float]:
     return found
 
 
-@question
+@cached
 def _steady_numbers(model: Model) -> ArrayFunction:
     """Function that returns for each contact: velocity, friction stress, normal stress by the contact law, memory."""
     found = []

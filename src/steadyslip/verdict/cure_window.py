@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from steadyslip.core.format import digits_apart, format_like
 from steadyslip.core.pages import Displayed
-from steadyslip.core.written import WrittenAs, told_as
+from steadyslip.core.written import WrittenAs, displayed_as
 from steadyslip.linear.nearness import doublings, ends_about
 
 LEAST = 1e-12  # smallest over largest value searched, of a parameter whose own value is 0
@@ -92,6 +92,6 @@ class Window(Displayed):
         if 0 == self.limits[0] < value < LEAST * self.limits[1]:
             return "anything above 0"  # the edge is 0 itself, as for the damping of a machine that nothing damps yet
         factor, unit = self.told or (1.0, self.unit)
-        with told_as(self.written_as):
+        with displayed_as(self.written_as):
             digits = digits_apart(value, self.value if beside is None else beside)
             return format_like(value * factor, self.value * factor, unit, digits, self.area)

@@ -321,7 +321,7 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
     values = _scan(chances, name, (low, high))
     unit, about = (
         chances.rig.parameters()[name].role.unit,
-        (chances.rig.printed_area(name), chances.rig.told(name, 1.0), chances.rig.written_as(name)),
+        (chances.rig.printed_area(name), chances.rig.display_value(name, 1.0), chances.rig.written_as(name)),
     )
     if not values.size:
         return Window(name, unit, chances.own(name), (), (low, high), math.inf, *about)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.linear.boundary import Margin
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.structures import StructureBody
 from steadyslip.model.numeric import by_matrices, has_response
@@ -93,7 +93,7 @@ def nearest_edge(found: Findings, margin: Margin) -> str:
     side = "above" if edge.value > margin.value else "below"
     value = format_parameter(found.rig, margin.parameter, edge.value, margin.value)
     what = PHRASES["stable"] if edge.stable == side else EDGE_WORDS["quiet"] if edge.quiet == side else beyond(edge)
-    return PHRASES["nearest"].format(name=said(found.rig, margin.parameter), side=side, value=value, beyond=what)
+    return PHRASES["nearest"].format(name=label_of(found.rig, margin.parameter), side=side, value=value, beyond=what)
 
 
 def _sliding(steady: SteadyMachine) -> str:

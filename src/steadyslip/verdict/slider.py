@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.areas import stress_name, told_area
+from steadyslip.core.areas import display_area, stress_name
 from steadyslip.core.checks import Check
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
@@ -102,7 +102,7 @@ def _stress(analysis: Findings, value: float) -> str:
     if area is None:
         return stress
     force = format_quantity(value * area, "N")
-    return f"{stress} ({force})" if told_area("Pa", area) is None else f"{force} ({stress})"
+    return f"{stress} ({force})" if display_area("Pa", area) is None else f"{force} ({stress})"
 
 
 def _pull(rig: Slider) -> list[tuple[str, str]]:

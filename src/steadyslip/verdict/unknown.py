@@ -16,7 +16,7 @@ from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.written import WrittenAs, told_as
+from steadyslip.core.written import WrittenAs, displayed_as
 from steadyslip.linear.status import STABLE, status
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -55,7 +55,7 @@ class ValuesWithin(Displayed):
 
     def shown(self, value: float) -> str:
         """Format a value with its unit; a value per load also as that of the contact."""
-        with told_as(self.written_as):
+        with displayed_as(self.written_as):
             text = format_quantity(value, self.unit)
         if self.load is None or self.unit not in PER_LOAD or " at " in text:
             return text

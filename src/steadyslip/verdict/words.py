@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from steadyslip.core.checks import UNDECIDED
 from steadyslip.core.format import digits_apart, format_as_written, format_growth, format_quantity, format_range
-from steadyslip.core.written import told_as
+from steadyslip.core.written import displayed_as
 from steadyslip.linear.boundary import REMOTE
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 from steadyslip.verdict.reasons import NEXT_TO_IT
 from steadyslip.verdict.support import gain_words
 
@@ -113,15 +113,16 @@ def headline(analysis: Findings, capitals: bool = True) -> str:
 def format_parameter(rig: Rig, name: str, value: float, beside: float | None = None) -> str:
     """Format a value of a parameter in the unit of the rig's file, with enough digits to differ from `beside`."""
     digits = 4 if beside is None else digits_apart(value, beside)
-    own, (number, unit) = rig.told(name, rig.parameters()[name].value or 0.0)[0], rig.told(name, value)
-    with told_as(rig.written_as(name)):
+    number, unit = rig.display_value(name, value)
+    own, _ = rig.display_value(name, rig.parameters()[name].value or 0.0)
+    with displayed_as(rig.written_as(name)):
         return format_as_written(number, own, unit, digits, area=rig.printed_area(name))
 
 
 def format_parameter_range(rig: Rig, name: str, low: float, high: float) -> str:
     """Format a range of a parameter in the unit of the rig's file."""
-    (first, unit), (last, _) = rig.told(name, low), rig.told(name, high)
-    with told_as(rig.written_as(name)):
+    (first, unit), (last, _) = rig.display_value(name, low), rig.display_value(name, high)
+    with displayed_as(rig.written_as(name)):
         return format_range(first, last, unit, rig.printed_area(name))
 
 
@@ -160,7 +161,7 @@ def onset_words(onset: Onset) -> str:
     """Sentence on the kind of onset; if subcritical, with the size of the unstable oscillation for this rig."""
     text = f"{onset.kind}: {_ONSETS[onset.kind]}"
     if onset.rig.default_along is None:
-        text = text.replace("edge in stiffness", f"edge in {said(onset.rig, onset.along)}")
+        text = text.replace("edge in stiffness", f"edge in {label_of(onset.rig, onset.along)}")
     elif onset.along == onset.rig.gain_name():
         text = text.replace("edge in stiffness", f"edge in the {gain_words(onset.rig)}")
     own = onset.rig.parameters()[onset.along].value

@@ -10,7 +10,7 @@ from explored_edges import written
 from explored_pages import Visit
 from joint_at_radius import joint
 from machines import block
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 from steadyslip.verdict.words import EIGENVALUE_COLUMNS, eigenvalue_row
 
 MACHINES = Path(__file__).parents[3] / "examples" / "machines"
@@ -63,7 +63,7 @@ def test_a_page_of_a_machine_says_what_analyze_says(browser, page_of_servo):
         assert heads == list(EIGENVALUE_COLUMNS)
         first = analysis.margins[0].parameter
         bar = visit.page.locator(".bar").get_attribute("aria-label")
-        assert said(machine, first) in bar, "the bar begins with the nearest edge"
+        assert label_of(machine, first) in bar, "the bar begins with the nearest edge"
         visit.page.get_by_label("parameter of the bar").select_option("drive.kp")
         bar = visit.page.locator(".bar").get_attribute("aria-label")
         assert "proportional gain k_p" in bar

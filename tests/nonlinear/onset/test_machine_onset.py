@@ -9,7 +9,7 @@ import sympy as sp
 import steadyslip as ss
 from machine_onsets import compared
 from machines import rate_state, renamed, same_block, surface, three_bodies, two_mass
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 
 KP = "drive.kp"
 
@@ -188,7 +188,7 @@ def test_the_verdict_on_a_machine_tells_the_onset_at_its_nearest_edge():
         nearest = next(one for one in found.margins if one.edge is not None and one.edge.kind == "oscillatory")
         own = ss.hopf(machine, nearest.parameter)
         np.testing.assert_allclose(numbers(found.onset), numbers(own), rtol=1e-9)
-        assert f"onset {own.kind}: just beyond the edge in {said(machine, nearest.parameter)}" in " ".join(
+        assert f"onset {own.kind}: just beyond the edge in {label_of(machine, nearest.parameter)}" in " ".join(
             str(found).split()
         )
         data = found.to_dict()["onset"]

@@ -14,8 +14,8 @@ from functools import lru_cache
 import numpy as np
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import InternalError
-from steadyslip.core.questions import question
 from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.commanded import CommandedInputs, time_windows
 from steadyslip.experiments.fitting.comparison import RecordPart
@@ -71,7 +71,7 @@ class Features:
     fastest: float
 
 
-@question
+@cached
 def features(record: Record, rate: float) -> Features:
     """Features of a record; `rate` is the load-point velocity at its start, m/s."""
     record = replace(record, friction=_without_spikes(record.friction), commanded=record.loading)

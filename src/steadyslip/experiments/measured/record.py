@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import HasCache, cached
 from steadyslip.core.domains import real
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.questions import Keeper, question
 from steadyslip.core.results import read_only
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments.loading.across import yielding
@@ -33,7 +33,7 @@ DRIFT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Record(Displayed, Keeper):
+class Record(Displayed, HasCache):
     """Record of an experiment; made by `read_record` or `record_from_arrays`.
 
     Attributes
@@ -345,7 +345,7 @@ def seconds(name: str, value: Any) -> float:
 # -- decimation
 
 
-@question
+@cached
 def transient_rows(record: Record, count: int) -> Array:
     """Indices of about `count` rows to keep: dense just after each change of the loading, then ever sparser."""
     cumulated = np.cumsum(_samples_wanted(record, count))

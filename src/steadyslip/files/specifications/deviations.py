@@ -73,7 +73,7 @@ def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[flo
     def half_width(text: str) -> float:
         if text.endswith("%"):
             return 0.01 * float(text[:-1]) * abs(value)
-        factor, unit = rig.told(name, 1.0)
+        factor, unit = rig.display_value(name, 1.0)
         return Parameter(unit, nonnegative, "tolerance").read(text, rig.area_of(name)) / factor
 
     low, high = value - half_width(tolerance.below), value + half_width(tolerance.above)
@@ -87,7 +87,7 @@ def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[flo
             share = f"{width.partition(' ')[0]} %"
             hint = "" if width.endswith("%") else f"; for a share of the value write '± {share}'"
             with display_units(units_in([width])):
-                told = format_quantity(*rig.told(name, end), area=rig.printed_area(name))
+                told = format_quantity(*rig.display_value(name, end), area=rig.printed_area(name))
             wide = f"a tolerance of {width!r} is too wide: it reaches {told}; allowed: {one.role.domain.text}{hint}"
             raise ParameterError([Problem("", wide)]) from error
     return low, high

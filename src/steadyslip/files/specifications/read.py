@@ -16,7 +16,7 @@ from steadyslip.core.errors import (
     repr_short,
 )
 from steadyslip.core.options import checked
-from steadyslip.core.quantities import units_in, units_named, units_told
+from steadyslip.core.quantities import result_units, units_in, units_named
 from steadyslip.core.records import FrozenRecord
 from steadyslip.core.tolerances import Tolerance
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
@@ -236,9 +236,10 @@ def read_contents(
     first, _, rest = text.partition("\n")
     if found.rig is not None and rest and first.startswith(TOLD_IN):
         names = [one.split(" = ") for one in first.removeprefix(TOLD_IN).split("; ") if one]
-        found.rig.told_in(sorted(units_in([f"1 {own}" for own, *of in names if not of])))
+        found.rig.set_display_units(sorted(units_in([f"1 {own}" for own, *of in names if not of])))
         own = {name: f"1 {one[0]}" for name, *one in names if one}
-        found.rig.told_by(units_named({name: one for name, one in own.items() if name in found.rig.parameters()}))
+        known = found.rig.parameters()
+        found.rig.set_parameter_units(units_named({name: one for name, one in own.items() if name in known}))
     return found
 
 
@@ -273,8 +274,8 @@ def read_tables(
     found = {section.name: reader.settings(section) for section in further}
     said = {name: one for name, one in found.items() if one is not None}
     if rig is not None:
-        rig.told_in(sorted(units_told(tables))).named(Path(source).name if source.endswith(".toml") else "")
-        rig.told_by(units_named({name: raw for name, (raw, _) in reader.questioned.items()}))
+        rig.set_display_units(sorted(result_units(tables))).named(Path(source).name if source.endswith(".toml") else "")
+        rig.set_parameter_units(units_named({name: raw for name, (raw, _) in reader.questioned.items()}))
         faults += wrong_ends(rig, tolerances)
         if rig.written_in:  # numbers alone are SI units, as programs write them
             question_values(rig, reader.questioned, units_in(tables))

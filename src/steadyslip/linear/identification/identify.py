@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
-from steadyslip.core.questions import question
 from steadyslip.linear.identification.partial_fractions import ModalSum
 from steadyslip.linear.identification.vector_fitting import relocated, residues
 from steadyslip.machine.machine import Machine
@@ -130,7 +130,7 @@ def identified_modes(machine: Machine) -> IdentifiedModes:
     return found
 
 
-@question
+@cached
 def _identified(machine: Machine) -> IdentifiedModes:
     return identify(next(iter(machine.bodies.values())).response)
 

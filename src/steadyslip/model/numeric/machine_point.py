@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import HasCache, cached
 from steadyslip.core.errors import NoSteadySliding, NotAvailable
 from steadyslip.core.format import format_quantity
-from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import with_values
 from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric import refuse_response
@@ -69,7 +69,7 @@ class MachinesAlong:
         return np.array([self._pencil(i).growing(sure) for i in range(len(self.posed))])
 
 
-class MachinePoint(Keeper):
+class MachinePoint(HasCache):
     """A machine in numbers; matrices, steady sliding and pencil are computed on first use."""
 
     def __init__(self, machine: Machine) -> None:
@@ -122,7 +122,7 @@ class MachinePoint(Keeper):
         return int(np.sum(self.pencil.eigenvalues.real > 0))
 
 
-@question
+@cached
 def _point(machine: Machine) -> MachinePoint:
     return MachinePoint(machine)
 

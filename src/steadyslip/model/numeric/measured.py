@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
-from steadyslip.core.questions import question
 from steadyslip.core.records import with_values
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.responses import ResponseData
@@ -330,7 +330,7 @@ def _hertz(omega: float) -> str:
     return format_quantity(omega / (2 * np.pi), "Hz")
 
 
-@question
+@cached
 def _machine(machine: Machine) -> MeasuredMachine:
     return MeasuredMachine(machine)
 

@@ -195,7 +195,7 @@ def _changes(rig: Slider | Machine, asked: Iterable[tuple[_Move, ...]]) -> Itera
 
 
 def _told(rig: Slider | Machine, move: _Move, power: float) -> str:
-    value = format_quantity(*rig.told(move.name, _moved(move, power)), area=rig.printed_area(move.name))
+    value = format_quantity(*rig.display_value(move.name, _moved(move, power)), area=rig.printed_area(move.name))
     return f"{move.name} {'above' if move.factor > 1 else 'below'} {value}"
 
 

@@ -89,7 +89,7 @@ def hunt(
     HUNTS ±65.65 mm about the target every 24.01 s
     """
     if not rig.holds:
-        now = format_quantity(*rig.told("drive.velocity", float(rig.drive.velocity)))
+        now = format_quantity(*rig.display_value("drive.velocity", float(rig.drive.velocity)))
         control = "rotary-pid" if rig.drive.turns else "pid"
         gains = "" if isinstance(rig.drive, Holding) else f", and control = '{control}' with gains"
         message = f"got {now}; hunting is of a drive that holds a place: write velocity = 0{gains}"

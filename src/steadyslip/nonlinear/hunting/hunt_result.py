@@ -198,7 +198,7 @@ class Hunt(ReadOnly):
         step = getattr(drive, "resolution", None)
         if not step or ratio == 1.0:
             return ""
-        at, acts = format_quantity(*self.rig.told("drive.resolution", step)), "rad" if drive.turns else "m"
+        at, acts = format_quantity(*self.rig.display_value("drive.resolution", step)), "rad" if drive.turns else "m"
         return f"{at} of {drive.watched()[0]}, {format_quantity(step / ratio, acts)} of {drive.driven()}"
 
     @property

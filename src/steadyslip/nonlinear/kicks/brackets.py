@@ -12,7 +12,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.options import BRANCH, NAME, SIGN, THREADS, checked, finite
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.version import version
-from steadyslip.machine.letters import said
+from steadyslip.machine.letters import label_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
@@ -141,7 +141,7 @@ def _axes(made: Any, rig: Slider | Machine, vary: Mapping[str, Any]) -> dict[str
         for dim in getattr(values, "dims", ()):
             if dim in made.coords and np.array_equal(values, made[dim]):
                 name = rig.resolve(given)
-                own = {"units": rig.parameters()[name].role.unit, "long_name": said(rig, name)}
+                own = {"units": rig.parameters()[name].role.unit, "long_name": label_of(rig, name)}
                 found[dim] = own | dict(made[dim].attrs)
     return found
 

@@ -6,8 +6,8 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import question
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction
 from steadyslip.model.scales import natural_scales
@@ -18,7 +18,7 @@ ROUNDING = 1e-14  # relative rounding error of stresses, in units of the normal 
 BALANCED = 12  # largest number of Newton iterations for the balance of forces
 
 
-@question
+@cached
 def field_of(reduction: Reduction) -> ArrayFunction:
     """Function of rates and slip rates, then residuals of the force balances and their slopes, row by row (cached).
 
@@ -29,7 +29,7 @@ def field_of(reduction: Reduction) -> ArrayFunction:
     return _at_constant_inputs(reduction, [*reduction.rates, *speeds, *reduction.residuals, *slopes])
 
 
-@question
+@cached
 def _jacobian_of(reduction: Reduction) -> ArrayFunction:
     """Function of the Jacobian of the rates (cached)."""
     return _at_constant_inputs(reduction, [entry for row in reduction.jacobian() for entry in row])
@@ -128,7 +128,7 @@ def slip_rates_at(rest: Rest, state: Array, unknowns: Array) -> Array:
     return in_columns(found[n : n + len(rest.reduction.slidings)], len(state))
 
 
-@question
+@cached
 def _normal_of(reduction: Reduction) -> ArrayFunction:
     """Function of the normal stresses of all contacts (cached)."""
     still = dict.fromkeys((TIME, *reduction.slopes), sp.Integer(0))

@@ -9,9 +9,9 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable, Problem
 from steadyslip.core.expressions import ArrayFunction, derivative
-from steadyslip.core.questions import question
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
@@ -183,12 +183,12 @@ def _place(model: Model, at: str) -> int:
     return [one.name for one in model.coordinates].index(at)
 
 
-@question
+@cached
 def _inertias(model: Model) -> ArrayFunction:
     return model.function(one.inertia for one in model.coordinates)
 
 
-@question
+@cached
 def _levers(model: Model, at: str) -> ArrayFunction:
     """Slip rate of each contact per velocity of a body: moving alone, or else with all bodies as in sliding."""
     body = model.coordinates[_place(model, at)]

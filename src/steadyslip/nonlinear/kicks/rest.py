@@ -9,8 +9,8 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import question
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import natural_scales
@@ -158,17 +158,17 @@ def picked(array: Any, which: Array) -> Any:
     return array[which] if np.ndim(array) and len(array) > 1 else array
 
 
-@question
+@cached
 def _shifts(reduction: Reduction) -> ArrayFunction:
     return reduction.model.function(reduction.shifts)
 
 
-@question
+@cached
 def _ratios(reduction: Reduction) -> ArrayFunction:
     return reduction.model.function(one.ratio for one in reduction.slidings)
 
 
-@question
+@cached
 def _slip_gradients(reduction: Reduction) -> ArrayFunction:
     return reduction.model.function(sp.diff(one.slip, s) for one in reduction.slidings for s in reduction.state)
 

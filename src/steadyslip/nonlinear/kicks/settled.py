@@ -14,8 +14,8 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import question
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import SPEED, V_LP, P, Reduction, W
@@ -41,7 +41,7 @@ class _Balance:
     state: ArrayFunction
 
 
-@question
+@cached
 def _balance(reduction: Reduction) -> _Balance:
     """Equation for the normal stress in steady sliding at v_lp and p, its slope, and the state there (cached)."""
     model = reduction.model
@@ -174,7 +174,7 @@ def _as_fast(reduction: Reduction, point: OperatingPoint, faster: Array) -> list
 FASTER = inner_symbol("faster", positive=True)
 
 
-@question
+@cached
 def _steady_state_of(reduction: Reduction) -> ArrayFunction:
     """Function of the steady state, from parameters, normal stresses and the factor of velocity (cached)."""
     model = reduction.model

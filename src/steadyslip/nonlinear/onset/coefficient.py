@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import question
 from steadyslip.linear.roots import quietly
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
@@ -76,7 +76,7 @@ def coefficients(point: OperatingPoint, omega: Array) -> Cubic:
     return _projected(expansion, omega, *np.split(np.stack(numbers, axis=1), 2, axis=1))
 
 
-@question
+@cached
 def _at_contacts(model: Model) -> ArrayFunction:
     """Steady slip rates (m/s) and areas (m²) of the contacts (cached)."""
     contacts = model.contacts

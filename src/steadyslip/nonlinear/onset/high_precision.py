@@ -15,8 +15,8 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.expressions import ArrayFunction, PreciseFunction
-from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.taylor import EPS, Index, arrangements, system
@@ -82,7 +82,7 @@ def coefficient(
         return None
 
 
-@question
+@cached
 def _steady_residuals(model: Model) -> list[sp.Expr]:
     """Residuals of steady sliding: of normal stresses and of forces carried by links (cached)."""
     residuals = [contact.steady_stress - contact.sigma_ss for contact in model.contacts]
@@ -100,7 +100,7 @@ def _steady_residuals(model: Model) -> list[sp.Expr]:
     return residuals
 
 
-@question
+@cached
 def _linear(model: Model) -> tuple[sp.Expr, ...]:
     """First derivatives of the model, residuals of steady sliding, and slip rates (cached)."""
     found = system(model)
@@ -108,7 +108,7 @@ def _linear(model: Model) -> tuple[sp.Expr, ...]:
     return (*found.expressions[: len(found.entries[0])], *_steady_residuals(model), *speeds)
 
 
-@question
+@cached
 def _functions(model: Model) -> tuple[ArrayFunction, PreciseFunction, PreciseFunction]:
     """Compiled functions: `_linear` in double precision and in fifty digits, higher derivatives in fifty (cached)."""
     higher = system(model).expressions[len(system(model).entries[0]) :]

@@ -13,9 +13,9 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, derivative
-from steadyslip.core.questions import question
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.layout import Final, Recorded, Sampled, Setting
 from steadyslip.kernels.runner import LOG_KINDS, SETTINGS, Runner, runner
@@ -62,13 +62,13 @@ class FlowFailure(Failure):
         return f"{self.status} at {self.contact}" if self.contact else self.status
 
 
-@question
+@cached
 def _with_sensitivities(reduction: Reduction, method: str) -> Runner:
     """Compiled equations of motion with their variational equations (cached)."""
     return Runner(with_sensitivities(reduction), Choice(method, dense=False))
 
 
-@question
+@cached
 def _slip_shares(reduction: Reduction, contact: int) -> ArrayFunction:
     """Derivative of slip at a contact in each state variable, and its steady slip rate over the drive's (cached)."""
     sliding = reduction.slidings[contact]

@@ -8,9 +8,9 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.caching import cached
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.questions import question
 from steadyslip.kernels.layout import Setting
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -26,7 +26,7 @@ from steadyslip.nonlinear.orbits.flow import FlowRunner, FlowSetting
 DIFFERENCE = 1e-5  # relative step of the parameter for central differences of the constants
 
 
-@question
+@cached
 def _shifts(reduction: Reduction) -> ArrayFunction:
     """Change of each state variable for a unit displacement of the load point (cached)."""
     return reduction.model.function(reduction.shifts)

@@ -1,4 +1,4 @@
-"""The command line: thin, every command calls one public function. Nothing may know it."""
+"""The command line: each command calls one public function. No other folder imports this one."""
 
 from steadyslip.cli.program import app, main
 

@@ -1,4 +1,4 @@
-"""Commands that judge a rig: `analyze`, `modes`, `cure` and `compare`."""
+"""Commands for verdicts on rigs: `analyze`, `modes`, `cure` and `compare`."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _predicted(
     along: str | None,
     branch: int,
 ) -> None:
-    """Analyze a rig with the friction of a fit: verdict of the best values, and probability of stability."""
+    """Run `analyze --fit`: verdict with the best values of a fit, and probability of stable sliding."""
     from steadyslip.experiments import predict
     from steadyslip.experiments.from_files import load_friction
     from steadyslip.files.specifications import read_slider

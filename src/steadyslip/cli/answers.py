@@ -1,4 +1,4 @@
-"""Print results of commands, and write them to files."""
+"""Printing of results, and writing them to files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _WIDTH = 120  # characters of a line, those of printed tables
 
 
 def print_text(text: str) -> None:
-    """Print text; raise an error if the standard output cannot be written to."""
+    """Print text; raises NotAvailable or OutputClosed if the standard output cannot be written."""
     from steadyslip.files.output import answering
 
     with answering():
@@ -29,7 +29,7 @@ def print_json(data: Any) -> None:
 
 
 def formula_data(result: Any, along: str | None) -> dict[str, str | None]:
-    """Formula of an edge of stability for JSON; None if there is none."""
+    """Formula of an edge of stability as entry ``formula`` for JSON; its value is None if there is no formula."""
     from steadyslip.core.errors import NotAvailable
 
     try:
@@ -39,7 +39,7 @@ def formula_data(result: Any, along: str | None) -> dict[str, str | None]:
 
 
 def print_formula(result: Any, along: str | None) -> None:
-    """Print the formula of an edge of stability in the parts that a document has, or why there is none."""
+    """Print the formula of an edge of stability, in parts as in documents, or the reason why there is none."""
     from steadyslip.core.errors import NotAvailable
     from steadyslip.core.progress import progress_text
     from steadyslip.linear.formula import formula_in_parts
@@ -61,9 +61,9 @@ def print_formula(result: Any, along: str | None) -> None:
 def output_result(
     result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], bool | None]
 ) -> None:
-    """Print a result as text or JSON, then write it to files; printing first keeps it if a file cannot be written.
+    """Print a result as text or JSON, then write it to files, so that a file that cannot be written loses nothing.
 
-    Exits with status 130 if the result, or `write` (which then returns True), was interrupted by Ctrl-C.
+    Exits with status 130 if the result was interrupted by Ctrl-C, or `write`, which then returns True.
     """
     if as_json:
         print_json(result.to_dict())

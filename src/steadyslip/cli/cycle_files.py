@@ -1,4 +1,4 @@
-"""Commands for cycles, thresholds, hunting, responses and frozen verdicts: read a rig file, compute, write files."""
+"""Cycles, thresholds, hunting, responses and frozen verdicts of rig files, and the files they are written to."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def cycles_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], along: str | None, between: Sequence[str] | None,
     doublings: int, say: Callable[[str], None],
 ) -> CycleBranch:  # fmt: skip
-    """`steadyslip.cycles` for the rig of a file; shows progress on a terminal.
+    """Branch of cycles by `steadyslip.cycles` for the rig of a file; shows progress on a terminal.
 
-    Unless a parameter is given along the stiffness of a slider, of a machine along the parameter of a link or of the
-    drive whose edge of oscillation is the nearest. What the rig does as it is takes a second and is passed to `say`
-    before the branch, which may take many, is followed.
+    The default of `along` is a slider's stiffness, or the link or drive parameter of a machine with the nearest
+    oscillatory edge. The motion of the rig itself, a text that takes about a second, is passed to `say` before the
+    branch is followed, which may take much longer.
     """
     rig = read_rig(path, changes)
     with progress_text("the motion of the rig itself"):
@@ -60,12 +60,12 @@ def cycles_of_file(
 
         found = cycles(rig, along, between=between, doublings=doublings, progress=progress)
         said("the cycle at the rig itself")
-        found.at_rig  # noqa: B018  (is computed here, and then known to all that is printed and written)
+        found.at_rig  # noqa: B018  (computed here and cached, for printing and writing)
         return found
 
 
 def _nearest_oscillation(machine: Slider | Machine) -> str:
-    """Name of the link or drive parameter whose oscillatory edge is nearest; any other where these have none."""
+    """Name of the link or drive parameter with the nearest oscillatory edge, or of any parameter if these have none."""
     found = margins(machine)
     built = [one for one in found if one.parameter.startswith(("links.", "drive."))]
     nearest = oscillatory_edge(built) or oscillatory_edge(found)
@@ -75,9 +75,9 @@ def _nearest_oscillation(machine: Slider | Machine) -> str:
 
 
 def write_branch(branch: CycleBranch, path: Path, source: Path | None = None) -> None:
-    """Write a branch as netCDF, as columns, as a document or as a figure, by the ending of the name.
+    """Write a branch as netCDF, columns, document or figure, by the ending of the name.
 
-    A document gives the hash of the `source`, the file that it was made of.
+    A document has the hash of `source`, the rig file.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def thresholds_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str,
     at: str | None = None, up_to: float | None = None,
 ) -> Thresholds:  # fmt: skip
-    """Thresholds of the rig of a file, for the named kicks, or the usual ones if none is named."""
+    """Thresholds of the rig of a file, for the kicks named, by default the usual ones."""
     rig = read_rig(path, changes)
     usual = tuple(name for name, kick in kicks_of(rig).items() if kick.usual)
     options = {"at": at, "direction": -1 if reverse else 1, "reference": reference, "up_to": up_to}
@@ -104,9 +104,9 @@ def thresholds_of_file(
 
 
 def write_thresholds(thresholds: Thresholds, path: Path, source: Path | None = None) -> bool:
-    """Write a document, or draw the basin of the same rig, by the ending; whether Ctrl-C cut the basin short.
+    """Write thresholds as document, or the rig's basin as figure, by the ending; True if Ctrl-C stopped the basin.
 
-    A document gives the hash of the `source`, the file that it was made of.
+    A document has the hash of `source`, the rig file.
 
     Raises
     ------
@@ -121,12 +121,12 @@ def write_thresholds(thresholds: Thresholds, path: Path, source: Path | None = N
 def hunt_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], pieces: Iterable[str], until: str | None, rtol: float
 ) -> Hunt:
-    """`steadyslip.hunt` for the rig and the protocol of a file, and further pieces in words; shows progress.
+    """Result of `steadyslip.hunt` for rig and protocol of a file and additional pieces (text); shows progress.
 
     Raises
     ------
     ParameterError
-        If anything is wrong; everything is listed.
+        If the file or an argument is invalid; lists all problems.
     """
     rig, protocol = read_experiment(path, changes, pieces, until, ends=False)
     with progress_text("hunting") as said:
@@ -141,12 +141,12 @@ def response_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], periods: tuple[str, str], points: int,
     amplitudes: Iterable[str], input: str, output: str | None, on: str | None, limits: bool,
 ) -> FrequencyResponse:  # fmt: skip
-    """`steadyslip.response` for the rig of a file, between two periods.
+    """Result of `steadyslip.response` for the rig of a file at `points` periods between two.
 
     Raises
     ------
     ParameterError
-        If a period or amplitude is no quantity of its kind.
+        If a period is not a time, or an amplitude has the wrong unit.
     """
     rig = read_rig(path, changes)
     low, high = (_quantity("--periods", text, "s") for text in periods)
@@ -162,7 +162,7 @@ def response_of_file(
 
 
 def _quantity(option: str, text: str, unit: str) -> float:
-    """Read a command-line option as a quantity in SI units."""
+    """Value of a command-line option in SI units; raises ParameterError that names the option."""
     try:
         return parse(text, unit)
     except QuantityError as error:
@@ -170,7 +170,7 @@ def _quantity(option: str, text: str, unit: str) -> float:
 
 
 def write_answers(found: FrequencyResponse | FrozenVerdicts | Hunt, path: Path, title: str, source: Path) -> None:
-    """Write columns, a document with the hash of its `source`, or a figure, by the ending of the name.
+    """Write columns, a document with the hash of `source`, or a figure, by the ending of the name.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def verdicts_of_file(
     Raises
     ------
     ParameterError
-        If anything is wrong; everything is listed.
+        If the file or an argument is invalid; lists all problems.
     """
     rig, protocol = read_experiment(path, changes, pieces, until)
     with progress_of(protocol) as progress:

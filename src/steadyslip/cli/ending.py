@@ -1,4 +1,4 @@
-"""Exit statuses and error messages of the program: at most one message, whatever happens.
+"""Exit statuses and error messages of the program; a command prints at most one error message.
 
 0 success, 1 success but not stable (``--require-stable``), 2 error (explained in the message), 70 internal error of
 steadyslip, 130 interrupted (after printing what is complete), 141 standard output closed by its reader.
@@ -19,11 +19,11 @@ import typer
 
 
 def end(command: Callable[[], object]) -> None:
-    """Run a command, and exit with its status."""
+    """Run a command and exit with its status."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # a console without Greek letters shows a substitute
+        if isinstance(stream, TextIOWrapper):  # letters that the console lacks are replaced
             stream.reconfigure(errors="replace")
-    if sys.stdout is None:  # closed by who started this
+    if sys.stdout is None:  # closed by the calling program
         sys.exit(print_message("there is no standard output to write the answer to", 2))
     with warnings.catch_warnings():
         warnings.showwarning = partial(_show_warning, warnings.showwarning)
@@ -40,7 +40,7 @@ def status_of(command: Callable[[], object]) -> int:
         command()
     except SystemExit as left:
         status = left.code if isinstance(left.code, int) else 0 if left.code is None else 2
-    except KeyboardInterrupt:  # before there was a command
+    except KeyboardInterrupt:  # before a command began
         status = 130
     except OutputClosed:
         status = 141
@@ -50,7 +50,7 @@ def status_of(command: Callable[[], object]) -> int:
         status = print_message("there is not enough memory for this; ask for fewer points, samples or runs", 2)
     except OSError as error:
         status = print_message(_system_error_text(error), 2)
-        if error.filename is None:  # the output itself: what is still buffered would fail once more
+        if error.filename is None:  # standard output: flushing the buffer would fail again
             from steadyslip.files.output import discard_output
 
             discard_output()
@@ -91,7 +91,7 @@ def print_message(message: str, status: int, kind: str = "error") -> int:
 
 
 def _flush_output(status: int) -> int:
-    """Flush the standard output, and return `status` or that of the failure, which could not be reported later."""
+    """Flush the standard output; returns `status`, or that of a failure to write, which cannot be reported later."""
     from steadyslip.files.output import discard_output
 
     try:

@@ -1,4 +1,4 @@
-"""Files and JSON of the command ``steadyslip fit``."""
+"""Input files, output files and JSON of the command ``steadyslip fit``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ENDINGS = (".nc", ".html", ".json", *TABLES, *FIGURES)
 
 
 def split_files(files: Sequence[Path]) -> tuple[list[Path], Path | None]:
-    """Separate the paths of records from that of the fit file, which ends in .toml (None if there is none).
+    """Paths of records, and path of the fit file, which ends in .toml (None if there is none).
 
     Raises
     ------
@@ -62,7 +62,7 @@ def write_fit(fit: Fit | MachineFit, comparison: LawComparison | None, path: Pat
 
 
 def write_table(found: StepTable, path: Path) -> None:
-    """Write a table of steps as CSV or LaTeX, as the file's ending says.
+    """Write a table of steps as CSV or LaTeX, by the file's ending.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def write_speeds(found: SpeedFit, path: Path) -> None:
 
 
 def as_json(fit: Fit | MachineFit, comparison: LawComparison | None, table: StepTable | None = None) -> dict[str, Any]:
-    """Data of a fit for JSON, with those of the laws that it was compared with, and of its steps alone."""
+    """JSON-ready data of a fit, with the laws compared and the table of steps if given."""
     data = fit.to_dict() | ({} if table is None else {"steps": table.to_dict()})
     if comparison is not None:
         data["comparison"] = {

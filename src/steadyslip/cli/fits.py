@@ -92,7 +92,7 @@ def fit(
         output_result(members, output or (), as_json, write_population)
         return
     own = records_of(plan, records, skip_bad_lines)
-    for record in () if as_json else own:  # before the search, which may last
+    for record in () if as_json else own:  # before the search, which may take long
         print_text(f"{record}\n")
     found, comparison = cast("tuple[Fit, LawComparison | None]", fitted(plan, own))
     for path in others:
@@ -139,7 +139,7 @@ def fit(
 
 
 def _fit_speeds(files: Sequence[Path], law: str, changes: Sequence[str], output: Sequence[Path], as_json: bool) -> None:
-    """Fit a law to a table of speeds, and write the rig."""
+    """Fit a law to a table of speeds and friction; print the result and write it to files."""
     from steadyslip.cli.fit_files import SPEED_ENDINGS, write_speeds
     from steadyslip.experiments.from_speeds import fit_speed_files
     from steadyslip.files.output import check_output

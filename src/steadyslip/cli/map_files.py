@@ -31,12 +31,12 @@ def map_file(
     cluster: str | None = None, refine: bool = False, figure: Mapping[str, Any] | None = None,
     edge: Mapping[str, Any] | None = None,
 ) -> MapResult:  # fmt: skip
-    """Compute the map of a rig file into the path of `outputs` that ends in .zarr, or open a computed map.
+    """Map of a rig file, computed into the path of `outputs` that ends in .zarr, or a computed map that is opened.
 
     Raises
     ------
     ParameterError, NotAvailable
-        If anything is wrong; found before the computation where possible.
+        If the file or an argument is invalid; reported before the computation where possible.
     """
     _check_words(refine, figure or {}, edge or {})
     check_output([path for path in outputs if path.suffix != STORE], REFINED if refine else ENDINGS)
@@ -57,7 +57,7 @@ def map_file(
 
 
 def _check_words(refine: bool, figure: Mapping[str, Any], edge: Mapping[str, Any]) -> None:
-    """Raise an error for options that have no effect."""
+    """Raise ParameterError for options that would have no effect."""
     if refine:
         idle = [name for name, value in figure.items() if value is not None]
         message = "is for figures of a map; with --refine they show the edge. Draw the map itself in a second command"
@@ -80,7 +80,7 @@ def write_map(
     NotAvailable
         If the file cannot be written.
     ParameterError
-        If the figure cannot be drawn so.
+        If the figure cannot be drawn with these options.
     """
     writers: dict[str, Any] = {".nc": found.to_netcdf, ".parquet": found.to_parquet}
     if edge is None:
@@ -93,12 +93,12 @@ def write_map(
 def sensitivity_file(
     source: Path, changes: Iterable[str] = (), of: Sequence[str] = (), points: int = POINTS
 ) -> Sensitivity:
-    """Compute Sobol indices over the ranges of the grids and samples of a rig file's ``[map]``.
+    """Sobol indices over the ranges of the grids and samples of a rig file's ``[map]``.
 
     Raises
     ------
     ParameterError
-        If anything is wrong; lists every problem.
+        If the file or an argument is invalid; lists all problems.
     NotAvailable
         If a parameter has no range.
     """
@@ -109,7 +109,7 @@ def sensitivity_file(
     elif plan.sampling is not None:
         raise NotAvailable("the draws of a fit depend on each other, and Sobol indices are for independent parameters")
     own = {one.name: one for one in plan.compute}
-    wanted = tuple(own.get(name, name) for name in of)  # with the options that the file gives it
+    wanted = tuple(own.get(name, name) for name in of)  # with its options from the file
     return sensitivity(plan.rig, ranges, wanted or _numeric_measures(plan), points=points, protocol=plan.protocol)
 
 
@@ -133,7 +133,7 @@ def _range_of(axis: Axis) -> tuple[float, float, str]:
 
 
 def _numeric_measures(plan: Map) -> tuple[Any, ...]:
-    """Measures of the map with one number per point; the usual ones if there are none."""
+    """Quantities of the map that are one number per point; default ones if there are none."""
     found = tuple(
         one for one in plan.compute if not any(o.flags or o.extra for o in one.outputs(plan.rig, plan.varied))
     )

@@ -40,7 +40,7 @@ def _print_in(context: typer.Context, names: set[str]) -> None:
 
 
 def _set_width(context: typer.Context, wanted: bool) -> bool:
-    """Draw the figures of files as wide as one column of a journal if `wanted`."""
+    """Make figures as wide as one column of a journal if `wanted`."""
     from steadyslip.core.pictures import for_a_journal
 
     if wanted:
@@ -87,7 +87,7 @@ Fitted = Annotated[
 
 
 def outputs(what: str) -> Any:
-    """Option that names output files."""
+    """Option ``-o``, ``--output`` with a help text, which names output files."""
     return typer.Option("-o", "--output", help=f"{what}; repeatable")
 
 

@@ -1,4 +1,4 @@
-"""The program: all commands in the order in which `--help` lists them."""
+"""The command-line program: all commands, in the order of `--help`."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ COMMANDS = (
 )
 WRITTEN = (".html", ".png", ".svg", ".pdf", ".csv", ".nc", ".toml")  # files that commands write
 GARBAGE = 50_000
-"""Objects made between two searches for garbage: imports and formulas make some 10⁵ that live on, and Python's own 700
-take a tenth of a verdict's time."""
+"""Objects created between two garbage collections: imports and formulas create some 10⁵ lasting ones, and Python's
+default of 700 takes a tenth of a verdict's time."""
 
 
 class _Commands(TyperGroup):
-    """Group of commands that prints a message after Ctrl-C; Typer would exit without one."""
+    """Group of commands that prints a message after Ctrl-C, unlike Typer's own."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -40,17 +40,17 @@ class _Commands(TyperGroup):
 
 
 class _Command(TyperCommand):
-    """Command that says with which option a word too many is meant."""
+    """Command whose error for a surplus word suggests the option that was probably meant."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        ctx.allow_extra_args = True  # so that they come back in place of an error without advice
+        ctx.allow_extra_args = True  # surplus words are returned, for an error with advice
         rest: list[str] = super().parse_args(ctx, args)
         if rest and not ctx.resilient_parsing:
             ctx.fail(self._surplus(rest[0]))
         return rest
 
     def _surplus(self, word: str) -> str:
-        """Message on the first word that is neither an option nor an argument."""
+        """Error message for a word that is neither an option nor an argument."""
         if "=" in word:
             option, advice = "--set", f"to change a value write --set '{word}'"
         elif word.lower().endswith(WRITTEN):

@@ -1,4 +1,4 @@
-"""Run of a rig file with the options of a command line, and the files it is written to."""
+"""Simulation of a rig file with command-line options, and the files it is written to."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def run_file(
     rtol: float = 1e-7,
     contact: str | None = None,
 ) -> History:
-    """Simulate the rig of a file under its ``[protocol]`` and further pieces.
+    """Simulated motion of the rig of a file under its ``[protocol]`` and additional pieces.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def run_file(
     changes : iterable of str
         As in `read_rig`.
     pieces : iterable of str
-        Pieces as text, as for `piece_from_text`, after those of the file.
+        Pieces as text, see `piece_from_text`, added to those of the file.
     start : iterable of str
         Starting values as ``name=number`` in SI units.
     until : str, optional
@@ -60,7 +60,7 @@ def run_file(
     Raises
     ------
     ParameterError
-        If anything is wrong; lists every problem.
+        If the file or an argument is invalid; lists all problems.
     """
     rig, protocol = read_experiment(path, changes, pieces, until)
     check_contact(rig, contact)
@@ -75,12 +75,12 @@ def read_experiment(
     path: str | os.PathLike[str], changes: Iterable[str], pieces: Iterable[str], until: str | None, *,
     ends: bool = True,
 ) -> tuple[Slider | Machine, Protocol]:  # fmt: skip
-    """The rig of a file, and its ``[protocol]`` with further pieces and its end, if one is needed; see `run_file`.
+    """Rig of a file, and its ``[protocol]`` with additional pieces, as for `run_file`; `ends`: an end is required.
 
     Raises
     ------
     ParameterError
-        If anything is wrong; everything is listed.
+        If the file or an argument is invalid; lists all problems.
     """
     changes = (changes,) if isinstance(changes, str) else tuple(changes)  # read twice
     rig = read_rig(path, changes)
@@ -96,14 +96,14 @@ def read_experiment(
 
 @contextmanager
 def progress_of(protocol: Protocol) -> Iterator[Callable[[float], None]]:
-    """Shows on a terminal how far a run is; what it yields is called with the time reached."""
+    """Context that shows the progress of a run on a terminal; yields a function to call with the time reached (s)."""
     end = format_quantity(protocol.until or np.nan, "s")
     with progress_text("simulating") as said:
         yield lambda time: said(f"simulating, at {format_quantity(time, 's')} of {end}; Ctrl-C keeps what there is")
 
 
 def _pieces(texts: Iterable[str], rig: Slider | Machine) -> list[Piece]:
-    """Parse pieces; raises all problems together."""
+    """Protocol pieces from texts; raises ParameterError with all problems."""
     found, problems = [], []
     for text in texts:
         if text.endswith(".toml"):

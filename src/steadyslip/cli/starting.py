@@ -1,4 +1,4 @@
-"""Commands to begin with: `examples`, `init`, `schema` and `reproduce`."""
+"""Commands that need no rig: `examples`, `init`, `schema` and `reproduce`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files of a verdict: its picture, or its document."""
+"""Files of a verdict: figure or document."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from steadyslip.verdict import Analysis, Tolerated
 
 
 def write_verdict(found: Analysis, within: Tolerated | None, path: Path, source: Path) -> None:
-    """Write the verdict on a rig as .html, or as a picture: for machines the ranges, for sliders the stability chart.
+    """Write the verdict on a rig as document (.html) or figure: for machines its panels, for sliders a stability chart.
 
-    The chart is over what can be changed, as in the document.
+    The chart is over parameters that can be changed, as in the document.
 
     Raises
     ------

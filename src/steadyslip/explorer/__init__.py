@@ -1,6 +1,6 @@
 """Browser page of a rig in one file: its equations as generated JavaScript, its numbers as data.
 
-Equations are printed from the Model, its linearisation and kernels; `web/` has no physics.
+Equations are generated from the Model, its linearisation and kernels; `web/` has no physics.
 """
 
 from __future__ import annotations

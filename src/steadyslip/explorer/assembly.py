@@ -60,29 +60,29 @@ MODULES = (
     "edges", "banner", "controls", "map", "locus", "facts", "mover", "sketch", "disturbances", "course", "view",
     "leaving", "presets", "page",
 )  # fmt: skip
-"""Modules of the page in `web/`, each after those that it imports."""
+"""Modules of the page in `web/`, each after the modules that it imports."""
 ENTRIES = ("mount", "render")
 """Functions of the modules that the page and its widget call."""
 DEFAULTS = {
     "factor": 1.0, "low": 0, "high": None, "lowAllowed": False, "highAllowed": True, "whole": False,
     "allowed": "a finite number > 0",
 }  # fmt: skip
-"""Entries that the data of a parameter leave out where they are these, which a page has once."""
+"""Default entries of a parameter's data, which are left out of the data and stored once."""
 WORKER_MODULES = ("motion",)
-"""Modules of the worker, which also gets the runtime and the driver, as text from the page."""
+"""Modules of the worker; the page also sends it the runtime and the driver as text."""
 WORKER_ENTRIES = ("Motion", "serve")
 """Names of these modules that the worker's own code uses."""
 MOTION_KEYS = ("layout", "routines", "segments")
-"""Entries of a kernel that `web/motion.js` uses beside its programs."""
+"""Entries of a kernel that `web/motion.js` uses besides its programs."""
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data:; worker-src blob:; "
     "base-uri 'none'; form-action 'none'"
 )
-"""Content security policy: no requests; workers and images are made from the text of the page."""
+"""Content security policy: no requests; workers and images come from the page itself."""
 
 
 def page(rig: Slider | Machine, title: str, branch: int, text: str = "") -> str:
-    """HTML text of the page of a rig; `text` is that of its rig file, or empty."""
+    """HTML text of the page of a rig; `text` is the text of its rig file, or empty."""
     return document(f"{title} – steadyslip", style(), fragment(rig, title, branch, text))
 
 
@@ -113,15 +113,15 @@ def style() -> str:
 
 
 def fragment(rig: Slider | Machine, title: str, branch: int, text: str = "", theme: str = "") -> str:
-    """HTML of the explorer of a rig as a part of a document, which may have several.
+    """HTML of the interactive page of a rig as a part of a document, which may have several.
 
-    With the `text` of a rig file it shows values in the units of the file, and saves it with its comments. The `theme`
-    is "light" in documents that are, and that of the browser unless given.
+    With the `text` of a rig file it shows values in the units of the file, and saves them with its comments. `theme` is
+    "light" for documents with a light theme; by default the theme is that of the browser.
 
     Raises
     ------
     NotAvailable
-        If an equation has a function that cannot be printed, or numbers leave the range of floating point.
+        If an equation has a function without JavaScript equivalent, or numbers leave the range of floating point.
     """
     code, known = page_parts(rig, title, branch, text)
     shown = f' data-theme="{theme}"' if theme else ""
@@ -152,8 +152,8 @@ def page_parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -
         machine, moving = motion_part(rig, branch)
         driven = driver()
         if moving["parameters"] == facts["parameters"]:
-            del moving["parameters"]  # equal to those of `facts`
-    except NotAvailable as refused:  # a page without motion still has the verdict
+            del moving["parameters"]  # `facts` has them already
+    except NotAvailable as refused:  # the page shows the verdict without motion
         still = str(refused)
     script = _joined(MODULES, ENTRIES, text)
     engine = _minified(driven, DRIVER)
@@ -173,7 +173,7 @@ def page_parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -
 
 
 def _joined(names: Iterable[str], known: Iterable[str], *generated: str) -> str:
-    """Minified modules of `web/` in one scope, with what they and generated code need of the runtime."""
+    """Minified modules of `web/` in one scope, with the runtime functions that they and generated code need."""
     modules = [_read_web(f"{name}.js") for name in names]
     needed = javascript.runtime(*generated, *modules)
     return _shortened(javascript.as_script(needed, *modules), frozenset({*known, *javascript.runtime_names()}))
@@ -196,7 +196,7 @@ def _read_web(name: str) -> str:
 
 @in_written_units
 def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, Any], text: str) -> dict[str, Any]:
-    """Data of the page of a rig: parameters, rig file, sentences, checks."""
+    """Data of the page of a rig as JSON-ready dict: parameters, rig file, sentences, checks."""
     names = list(_variable_parameters(rig, facts))
     places = [names.index(name) if name in names else name for name in facts["parameters"]]
     point = operating_point(rig, None, rig.kept_zeros(), branch)
@@ -233,16 +233,16 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
 
 
 _NO_RIG = {"unknown": ("No such rig", ": numbers outside what a rig can have")}
-"""Headline at values that a page can be given and a rig cannot."""
+"""Headline for values that can be entered on a page but are not allowed in a rig."""
 _UNFIT = "a number leaves its range, or breaks a condition that several obey together"
 _TOLD_BESIDES = frozenset({"m", "m/s", "s", "Hz", "1/s", "rad/s", "Pa", "N", "N m", "Pa/m", "N/m", "N m/rad"})
-"""SI units of what a page tells beside parameters: motion, times, rates, stresses, forces, stiffnesses."""
+"""SI units of the results on a page: motion, times, rates, stresses, forces, stiffnesses."""
 
 
 def _written_units(rig: Slider | Machine) -> dict[str, list[tuple[str, float]]]:
-    """Units of the rig's file that differ from SI units, name and size, by SI unit of what a page tells.
+    """Units of the rig's file that differ from SI units, as (name, size in SI units), by SI unit of a page's numbers.
 
-    Those of friction per load, which a page tells of single parameters only, are left out.
+    Units of friction per load are left out: they are used for single parameters only.
     """
     told = {outside(one.role.unit, rig.area_of(name))[1] for name, one in rig.parameters().items()}
     units = {si: units_for(si, display_names()) for si in sorted(told | _TOLD_BESIDES) if si != "1"}
@@ -254,18 +254,18 @@ def _written_units(rig: Slider | Machine) -> dict[str, list[tuple[str, float]]]:
 
 
 def _slider_data(rig: Slider, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Page data of sliders only: sentences with the reasons of a verdict."""
+    """Page data for sliders only: phrases for the reasons of verdicts."""
     return {"reasons": page_reasons(rig) | slider_words.AT_EDGE, "means": slider_words.MEANS}
 
 
 def _stiffness(rig: Slider, names: list[str]) -> str | None:
-    """Name of the parameter of the bar of stable values of a slider; None without a stiffness."""
+    """Name of the stiffness of which a slider's page shows the stable values; None without a stiffness."""
     stiffness = "slider.axial_stiffness" if "slider.axial_stiffness" in names else rig.stiffness_name()
     return stiffness if stiffness in names else None
 
 
 def _machine_data(rig: Machine, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Page data of machines only: indices of areas of contacts, names of radii, what pulls at these, phrases."""
+    """Page data for machines only: indices of contact areas, names of radii, links that pull at contacts, phrases."""
     areas = [f"contacts.{name}.area" for name in rig.contacts]
     return {
         "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
@@ -277,14 +277,14 @@ def _machine_data(rig: Machine, facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _checked_parameter(rig: Machine, names: list[str]) -> str | None:
-    """Name of the first stiffness or gain that enters linearly, whose stable values the page compares with Python's."""
+    """Name of the first stiffness or gain that enters linearly; the page compares its stable values with Python's."""
     point = operating_point(rig)
     stiff = (name for name in rig.of_kind("stiffness") if name in names)
     return next((name for name in stiff if linear_set(point, name) is not None), None) if point.exists else None
 
 
 def _variable_parameters(rig: Slider | Machine, facts: Mapping[str, Any]) -> dict[str, Address]:
-    """Parameters that a page can vary: those in the equations that affect the verdict, or given in place of such."""
+    """Parameters that a page can vary, by name: those that affect the verdict, also by replacing another parameter."""
     known = {*facts["parameters"], *rig.replaces}
     return {
         name: one
@@ -322,7 +322,7 @@ def _rounded(value: float, digits: int) -> float:
 
 
 def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[str, Any]]:
-    """Answers of Python at the values of the rig and at some others, with which the page compares its own."""
+    """Results of Python at the values of the rig and at some others, with which the page compares its own."""
     stiff = ways_of(rig).compared(rig, names)
     changes: list[dict[str, float]] = [{}]
     for name, factor in ((stiff, 0.1), (stiff, 10.0), ("drive.velocity", 3.0)):
@@ -353,7 +353,7 @@ def _answer(rig: Slider | Machine, branch: int, bar: str | None) -> dict[str, An
 
 
 def _nearest_edge(rig: Machine, point: OperatingPoint, name: str | None) -> float | None:
-    """Edge of the stable values of a parameter nearest to its own value (SI); None if there is none."""
+    """Edge of the stable values of a parameter (SI) nearest to the rig's own value; None if there is none."""
     found = None if name is None else linear_set(point, name)
     if found is None or name is None or not np.any(found.changes):
         return None
@@ -372,18 +372,20 @@ def _judged_machine(rig: Machine, point: OperatingPoint, name: str | None) -> tu
 
 
 class _Ways(NamedTuple):
-    """What a page does in its own way for each kind of rig.
+    """Functions of a page that differ between sliders and machines.
 
     Attributes
     ----------
     sketch : callable
-        SVG of the rig.
+        Returns the SVG of the rig.
     compared : callable
-        Name of the parameter whose stable values the page compares with Python's, of the rig and the page's parameters.
+        Returns the name of the parameter whose stable values are compared with Python's, from the rig and the names of
+        the page's parameters.
     further : callable
-        Page data of this kind alone, of the rig and the facts of its equations.
+        Returns page data of this kind of rig, from the rig and the facts of its equations.
     judged : callable
-        Edge in the compared parameter and eigenvalues, of the rig, its operating point and that parameter.
+        Returns the nearest edge in the compared parameter, and the eigenvalues, from the rig, its operating point and
+        that parameter.
     """
 
     sketch: Callable[[Any], str]
@@ -397,5 +399,5 @@ _OF_MACHINES = _Ways(machine_sketch, _checked_parameter, _machine_data, _judged_
 
 
 def ways_of(rig: Slider | Machine) -> _Ways:
-    """What a page does in its own way for the kind of this rig."""
+    """Page functions for the kind of this rig."""
     return _OF_MACHINES if isinstance(rig, Machine) else _OF_SLIDERS

@@ -1,6 +1,6 @@
-"""Linear stability of a rig as programs for a page: functions of its parameters and steady normal stresses.
+"""JavaScript programs for linear stability on a page: functions of parameters and steady normal stresses.
 
-`web/linear.js` calls them.
+They are called by `web/linear.js`.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ SLIP_RATE = "slip_rate"  # name of the slip velocity of a contact on pages
 
 
 def page_model(rig: Slider | Machine) -> Model:
-    """Model of a rig in which zero terms that a page can vary are kept."""
+    """Model of a rig that keeps the terms of zero parameters which a page can vary."""
     return build_model(rig, rig.kept_zeros())
 
 
 def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
-    """JavaScript expression of the programs of linear stability, and data about them.
+    """JavaScript expression with the programs of linear stability, and data about them.
 
     Returns
     -------
@@ -51,16 +51,17 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         ``parameters`` (dotted names in the order of R), ``contacts`` (their names), ``searched`` (for each contact,
         True if σss is a root of its `residual`, False if `steady` has it), ``joint`` (True if all σss follow together),
         ``degree`` of the characteristic polynomial, ``closed`` (True if there is an `interval` in closed form),
-        ``couples`` (True if oscillations can couple, so that growth is told where nothing damps),
+        ``couples`` (True if oscillations can couple, so that growth is reported for undamped rigs),
         ``edge`` (relative size of rounding at an edge), ``grid`` (number of stresses of the search, first and last
         power of ten),
-        ``solved`` (residual of a root over the stress), ``observed`` (names, units and meanings of `observables`); for
-        machines those of `mode_part`, for sliders ``gain`` (parameter of the drive that acts as a stiffness, or None).
+        ``solved`` (tolerance of a root's residual, relative to the stress), ``observed`` (names, units and meanings of
+        `observables`); for machines those of `mode_part`, for sliders ``gain`` (drive parameter that acts as a
+        stiffness, or None).
 
     Raises
     ------
     NotAvailable
-        If an equation has a delay or a function that cannot be printed, or is too long.
+        If an equation has a delay, a function without JavaScript equivalent, or is too long.
     """
     model = page_model(rig)
     if model.carried is not None or not is_written_out(model):
@@ -123,7 +124,7 @@ def _meanings(rig: Slider | Machine) -> dict[str, str]:
 
 
 def _shown_observables(model: Model) -> tuple[list[str], list[sp.Expr]]:
-    """Names and expressions of observables in steady sliding, without displacements and zero velocities."""
+    """Names and expressions of observables in steady sliding, without displacements and velocities that are zero."""
     names, values = observed_in_steady_sliding(model)
     unseen = {f"{one.name}.x" for one in model.coordinates}
     unseen |= {f"{one.name}.v" for one in model.coordinates if one.speed == 0}
@@ -137,7 +138,7 @@ def _unit(model: Model, name: str) -> str:
 
 
 def _static_terms(model: Model) -> list[sp.Expr]:
-    """Terms whose sum is the static stiffness, as `steadyslip.linear.status.on_edge` takes them."""
+    """Terms whose sum is the static stiffness, as used by `steadyslip.linear.status.on_edge`."""
     if has_closed_form(model):
         part = response(model)
         return [part.k, part.mu * part.k * part.B2, part.mu * part.B3]
@@ -148,7 +149,7 @@ def _static_terms(model: Model) -> list[sp.Expr]:
 
 
 def _coefficient_program(model: Model, coefficients: Sequence[sp.Expr]) -> Program:
-    """Program of the coefficients and what `_verdict_values` makes of them; the highest is NaN if it is lost."""
+    """Program of the coefficients and their `_verdict_values`; the highest is NaN if lost by cancellation."""
     levels = highest_coefficients(model)
 
     def judged(values: list[Node]) -> list[Value]:
@@ -171,15 +172,15 @@ def _coefficient_program(model: Model, coefficients: Sequence[sp.Expr]) -> Progr
 
 
 def _verdict_values(c: list[Node], spare: Value, most: int) -> list[Value]:
-    """Coefficients, 1 or 0 for stable and for ill-posed, and the functions of `crossing.judged`, as nodes."""
+    """Nodes: coefficients; 1 or 0 for stable, and for ill-posed; the test functions of `crossing.judged`."""
     stable, functions = crossing.judged(c, select, spare, most)
     return [*c, *(select(truth, 1.0, 0.0) for truth in (stable, crossing.is_ill_posed(c, spare))), *functions]
 
 
 def _stable_set_programs(degree: int, spare: int) -> list[Program]:
-    """Programs for the stable set of p + k q: edges, polynomial in β² of the crossings, k of its roots, verdict at k.
+    """Programs for the stable set of p + k q: edges and polynomial in β² of crossings, k at a root, stability at k.
 
-    They read an array with the coefficients of p, then those of q. Of p + k q the `spare` highest may be 0.
+    They read an array with the coefficients of p, then those of q. The `spare` highest of p + k q may be 0.
     """
 
     def edges(p: list[Node], q: list[Node], _: Node) -> list[Value]:
@@ -210,7 +211,7 @@ def _interval(ingredients: list[Node]) -> Sequence[Value]:
 
 
 def _linear_split_program() -> Program:
-    """Program of p and q of a coefficient from its values at three values of a parameter, and 1 if it is linear."""
+    """Program: p and q of a coefficient p + k q from its values at three values of k, and 1 if it is linear, else 0."""
     made = Program("linear")
     low, own, high = ([made.load(place)] for place in range(3))
     p, q, straight = crossing.linear_split(low, own, high, select)
@@ -220,7 +221,7 @@ def _linear_split_program() -> Program:
 
 
 def _allowed(rig: Slider | Machine, model: Model) -> sp.Expr:
-    """Expression that is 1 if all conditions on several parameters together hold, else 0."""
+    """Expression that is 1 if all conditions between parameters hold, else 0."""
     symbols: dict[str, Any] = dict(model.parameters)
     relations = [condition.holds for _, condition in conditions(with_values(rig, symbols))]
     holds = [one if isinstance(one, sp.Basic) else sp.sympify(bool(np.all(one))) for one in relations]

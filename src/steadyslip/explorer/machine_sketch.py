@@ -1,4 +1,4 @@
-"""Sketch of a machine as SVG whose parts a page can move.
+"""Sketch of a machine as SVG with parts that a page can move.
 
 Bodies have the class ``part`` and their name in ``data-body``, wheels also their centre in ``data-turns``; links have
 the class ``link``, the positions of their ends in ``data-ends`` and the bodies there in ``data-bodies``.
@@ -13,7 +13,7 @@ from steadyslip.core.format import typeset
 from steadyslip.machine.drawing import DRIVEN, FORCED, INK, PALE, Drawing, Pencil, Point
 from steadyslip.machine.machine import Machine
 
-UNIT = 62.0  # SVG units for one unit of the drawing: texts of 11 fit (by trial)
+UNIT = 62.0  # SVG units per unit of the drawing: texts of size 11 fit (by trial)
 FONT_SIZES = {False: 11, True: 13}  # by `large`, SVG units
 _CLASSES = {PALE: "pale", DRIVEN: "load", FORCED: "forced"}
 _THIN = 'vector-effect="non-scaling-stroke"'
@@ -22,19 +22,19 @@ _THIN = 'vector-effect="non-scaling-stroke"'
 def machine_sketch(machine: Machine) -> str:
     """Self-contained ``<svg>`` element with the sketch of a machine."""
     pencil = SvgPencil()
-    Drawing(machine, pencil, values=False).draw()  # without values, which change on the page
+    Drawing(machine, pencil, values=False).draw()  # values change on the page
     return pencil.svg()
 
 
 class SvgPencil(Pencil):
-    """Pencil that makes SVG elements; y points up in the drawing, down in SVG."""
+    """Pencil that produces SVG elements; y points up in the drawing, down in SVG."""
 
     def __init__(self) -> None:
         self.parts: list[str] = []
         self.low, self.high = [math.inf, math.inf], [-math.inf, -math.inf]
 
     def svg(self) -> str:
-        """Whole ``<svg>`` element of all that has been drawn."""
+        """Complete ``<svg>`` element with everything drawn so far."""
         (x, y), (right, bottom) = [one - 6 for one in self.low], [one + 6 for one in self.high]
         wide, tall = right - x, bottom - y
         return (
@@ -144,7 +144,7 @@ class SvgPencil(Pencil):
 
     def link(self, start: Point, end: Point, sprung: bool, damped: bool, ends: tuple[str, str]) -> None:
         inner = SvgPencil()
-        Pencil.link(inner, (0, 0), (1, 0), sprung, damped, ends)  # drawn from 0 to 1 and stretched along itself only
+        Pencil.link(inner, (0, 0), (1, 0), sprung, damped, ends)  # drawn from 0 to 1, then stretched along its axis
         (x1, y1), (x2, y2) = self._to_page(*start), self._to_page(*end)
         angle, long = math.degrees(math.atan2(y2 - y1, x2 - x1)), math.hypot(x2 - x1, y2 - y1)
         path = "".join(part.split(' d="')[1].split('"')[0] for part in inner.parts)

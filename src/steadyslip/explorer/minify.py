@@ -11,12 +11,12 @@ _LITERAL = re.compile(
     r""""(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'"""  # strings
     r"|(?<=[(,=:?&|!]) ?/(?![/*])(?:\\.|\[(?:\\.|[^\]\\\n])*\]|[^/\\\n\[])+/[a-z]*"  # regular expressions
 )
-# products within sums, and sums at the begin of sums, in brackets that change nothing: not even the order of rounding
+# redundant brackets around products in sums, and around sums at the beginning of sums: rounding stays the same
 _PRODUCT = re.compile(r"(?<=[-+(,=?:<>&|])\(([\w.\[\]]+(?:[*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|])")
 _SUM = re.compile(r"(?<=[\[(,=?:])\(([\w.\[\]]+(?:[-+*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|\]])")
-# + (-a) b is - a b, to the last digit
+# + (-a) b equals - a b exactly
 _NEGATIVE = re.compile(r"(?:\+|(?<=[=(,?:]))\(-([\w.\[\]]+)\)(?=[-+*/),;])")
-_LINE_END = re.compile(r"([;{,\n])\n+")  # line ends that end no statement
+_LINE_END = re.compile(r"([;{,\n])\n+")  # line ends that do not end a statement
 _SPACED_SIGNS = re.compile(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *")
 
 
@@ -46,7 +46,7 @@ def _split_literals(text: str) -> Iterator[tuple[str, bool]]:
 
 
 def _template_end(text: str, at: int) -> int:
-    """Index after the template literal that begins at `at`, which may contain others."""
+    """Index after the template literal that begins at `at`; template literals may be nested."""
     at += 1
     while text[at] != "`":
         at = _hole_end(text, at + 2) + 1 if text.startswith("${", at) else at + (2 if text[at] == "\\" else 1)
@@ -54,7 +54,7 @@ def _template_end(text: str, at: int) -> int:
 
 
 def _hole_end(text: str, at: int) -> int:
-    """Index of the bracket that ends the code at `at` within a template literal."""
+    """Index of the bracket that closes the ``${`` code beginning at `at` in a template literal."""
     depth = 0
     while depth or text[at] != "}":
         depth += {"{": 1, "}": -1}.get(text[at], 0)
@@ -63,7 +63,7 @@ def _hole_end(text: str, at: int) -> int:
 
 
 def split_code(text: str) -> Iterator[tuple[str, bool]]:
-    """Parts as those of `_split_literals`, with the code within template literals as parts of their own."""
+    """Parts as from `_split_literals`, with code inside template literals split off as parts of its own."""
     for part, code in _split_literals(text):
         if part[:1] != "`":
             yield part, code
@@ -113,7 +113,7 @@ _RESERVED = frozenset(
     )
 )
 _LONG_NUMBER = re.compile(r"(?<![\w.])\d+\.\d{8,}(?:e-?\d+)?")
-_MIN_USES = 4  # uses from which a constant for a long number saves characters
+_MIN_USES = 4  # least number of uses for which a constant for a long number saves characters
 
 
 def function_names(text: str) -> set[str]:
@@ -144,7 +144,7 @@ def shorten_names(text: str, known: Iterable[str]) -> str:
 
 
 def share_numbers(text: str) -> str:
-    """Generated code that begins with ``(() => {``, with a constant for each long number used often."""
+    """Generated code, which begins with ``(() => {``; constants for long numbers used `_MIN_USES` times or more."""
     counts = Counter(_LONG_NUMBER.findall(text))
     names = {number: f"number{n}" for n, (number, many) in enumerate(counts.items()) if many >= _MIN_USES}
     if not names:
@@ -155,7 +155,7 @@ def share_numbers(text: str) -> str:
 
 
 def _drop_brackets(text: str) -> str:
-    """Code without doubled brackets, and without brackets around a whole assigned value."""
+    """Code without double brackets, and without brackets around a whole assigned value."""
     opened: list[int] = []
     closed: dict[int, int] = {}
     for at, sign in enumerate(text):

@@ -1,4 +1,4 @@
-"""Motion of a rig as JavaScript: its kernel, and the programs that start it at any parameter values."""
+"""JavaScript for the motion of a rig: its kernel, and programs that initialise it for any parameter values."""
 
 from __future__ import annotations
 
@@ -46,9 +46,7 @@ from steadyslip.motion.status import NEEDS_MASS, THROUGH_DASHPOT
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, Hold, NormalStressStep, Protocol, VelocityStep
 from steadyslip.protocol.segments import pack
 
-OPTIONS = Options(
-    rtol=1e-6, most_steps=100_000
-)  # errors below a pixel of the page; steps for some seconds in a browser
+OPTIONS = Options(rtol=1e-6, most_steps=100_000)  # errors below a pixel; steps for some seconds in a browser
 DISTURBANCES: dict[str, Callable[[float, float, float], Any] | None] = {
     "velocity": lambda at, size, drive: VelocityStep(at=at, to=drive * size),
     "hold": lambda at, size, drive: Hold(at=at, duration=size),
@@ -57,26 +55,26 @@ DISTURBANCES: dict[str, Callable[[float, float, float], Any] | None] = {
     "pull": lambda at, size, drive: DisturbanceStep(at=at, by=size),
     "blow": None,  # changes the starting velocity, not the protocol
 }
-"""Disturbances of a page: piece of a protocol from time (s), size (SI units) and drive velocity (m/s)."""
-# values of time, size, end and drive velocity whose sums and products all differ, so that each can be recognised
+"""Disturbances on a page: function that returns a protocol piece from time (s), size (SI) and drive velocity (m/s)."""
+# time, size, end and drive velocity; their sums and products all differ, so that each can be identified in segments
 _MARKERS = 3.0, 5.0, 1e3, 7.0
 DRIVER = {"advance": "steadyslip.kernels.driver.lanes", "observe": "steadyslip.kernels.driver.states"}
 
 
 def driver() -> str:
-    """JavaScript text of the driver of kernels, which does not depend on the rig."""
+    """JavaScript text of the kernel driver, which does not depend on the rig."""
     return transpiled(DRIVER)
 
 
 def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]]:
-    """JavaScript expression of the kernel of a rig with its starting programs, and data about it.
+    """JavaScript expression with the kernel of a rig and its initialisation programs, and data about it.
 
-    Zero terms of a slider can be varied on the page, except mass, which would need another kernel.
+    A slider's zero parameters can be varied on the page, except mass, which would need another kernel.
 
     Raises
     ------
     NotAvailable
-        If the rig does not slide steadily, its motion is ill-posed, or an equation cannot be printed.
+        If no steady sliding exists, motion is ill-posed, or an equation has no JavaScript equivalent.
     """
     inertial = build_model(rig).inertial
     kept = [name for name in rig.kept_zeros() if inertial or not build_model(rig, [name]).inertial]
@@ -109,16 +107,16 @@ def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]
 
 
 def _load_point_damping(rig: Slider | Machine, model: Model) -> Any:
-    """Total damping between load point and rig (zero if none); with damping, a jump of the load point is impossible."""
+    """Total damping between load point and rig, 0 if none; with damping the load point cannot jump."""
     elements = with_values(rig, dict(model.parameters)).mechanism().elements
     return sp.Add(*(abs(sp.sympify(one.damping)) for one in elements if LOAD_POINT in one.senses))
 
 
 def _segment_program(name: str, piece: Callable[[float, float, float], Any] | None) -> Program:
-    """Program of the protocol segments of a disturbance: reads time, size, end of the run and drive velocity.
+    """Program of the protocol segments of a disturbance, from time, size, end of the run and drive velocity.
 
-    The protocol is cut for the values `_MARKERS`; each number found in the segments shows which input it comes from.
-    The disturbance is taken to lie within the run; the page cuts what does not.
+    The protocol is cut into segments for the values `_MARKERS`; each number in the segments then identifies the input
+    it comes from. The disturbance is assumed to lie within the run; the page cuts off the rest.
     """
     made, (at, size, until, drive) = Program(name), _MARKERS
     pieces = () if piece is None else piece(at, size, drive)
@@ -132,7 +130,7 @@ def _segment_program(name: str, piece: Callable[[float, float, float], Any] | No
 
 
 def _facts(reduction: Reduction, kernel: Kernel, missing: set[str]) -> dict[str, Any]:
-    """Data that `web/motion.js` needs to run a kernel: names, sizes and indices of its arrays."""
+    """Data that `web/motion.js` needs to run a kernel: names, sizes and indices of arrays."""
     model, layout = reduction.model, kernel.layout
     further, begin = guess_count(layout) - 1, Setting.ATOL + layout.size
     guesses = [int(Setting.GUESS), *range(begin, begin + further)]
@@ -167,7 +165,7 @@ def _facts(reduction: Reduction, kernel: Kernel, missing: set[str]) -> dict[str,
 
 
 def _bodies(reduction: Reduction) -> list[list[Any]]:
-    """Name, unit of displacement, and indices of displacement and velocity in the outputs, for every coordinate."""
+    """For every coordinate: name, unit of displacement, and indices of displacement and velocity in the outputs."""
     first = Out.W_SLOPE * len(reduction.slidings)
     places = {name: first + len(reduction.continuous) + i for i, name in enumerate(reduction.further)}
     kept = {symbol: first + i for i, symbol in enumerate(reduction.continuous)}

@@ -1,4 +1,4 @@
-"""Programs that start a motion on a page: scales and settings, starting values, shares of disturbances.
+"""Programs that initialise a motion on a page: scales and settings, starting values, shares of disturbances.
 
 They read the array R: parameters, steady normal stresses, then the symbols of `Shares`.
 """
@@ -38,7 +38,7 @@ from steadyslip.motion.jobs import Options, numbers
 
 @dataclass(frozen=True)
 class Shares:
-    """Symbols for the share of a disturbance on coordinates and contacts, and for the factors of a blow on velocities.
+    """Symbols: shares of a disturbance on coordinates and contacts, and factors of a blow on velocities.
 
     For sliders `pushed` and `pressed` are empty (disturbances act on the block), and `blown` has the key "".
     """
@@ -60,11 +60,11 @@ class Shares:
 
     @property
     def symbols(self) -> list[sp.Symbol]:
-        """All symbols, in the order in which they follow in the array R."""
+        """All symbols, in their order in the array R."""
         return [*self.pushed.values(), *self.pressed.values(), *self.blown.values()]
 
     def places(self) -> dict[str, dict[str, int]]:
-        """Index of each share behind the normal stresses, by kind of disturbance (pull, normal, blow) and name."""
+        """Index of each share after the normal stresses in R, by kind of disturbance (pull, normal, blow) and name."""
         order = {symbol: place for place, symbol in enumerate(self.symbols)}
         along = {name: symbol for name, symbol in self.pushed.items() if not name.endswith(NORMAL)}
         named = {"pull": along, "normal": self.pressed, "blow": self.blown}
@@ -72,7 +72,7 @@ class Shares:
 
 
 def _blow_factor(coordinate: Coordinate) -> sp.Symbol:
-    """Symbol for the velocity at the start over that of steady sliding."""
+    """Symbol for the starting velocity over that of steady sliding."""
     return inner_symbol(f"blow_on_{coordinate.velocity.name}", positive=True)
 
 
@@ -80,7 +80,7 @@ def _blow_factor(coordinate: Coordinate) -> sp.Symbol:
 
 
 def start_program(reduction: Reduction, shares: Shares) -> Program:
-    """Program of the starting values: variables that are continuous at jumps, then guesses of the unknowns.
+    """Program of the starting values: variables continuous at jumps, then initial guesses of the unknowns.
 
     Values are those of steady sliding, with velocities multiplied by the factors of a blow.
     """
@@ -174,7 +174,7 @@ def _scale_values(
 
 
 def _all_eigenvalues_positive(entries: list[Node]) -> Any:
-    """Node that is true if all eigenvalues of a matrix, given by rows, have positive real parts."""
+    """Node that is true if all eigenvalues of a square matrix, given row by row, have positive real parts."""
     size = round(len(entries) ** 0.5)
     less: list[list[Value | None]] = [
         [None if _is_zero(e) else -e for e in entries[size * i : size * (i + 1)]] for i in range(size)

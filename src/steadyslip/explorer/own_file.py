@@ -1,4 +1,4 @@
-"""Rig file that a page saves: that of the user with comments and units, or a generated one."""
+"""Rig file that a page saves: the user's file with its comments and units, or a generated one."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
-_SENTINEL = 1.2345678901e-211  # marks values in a generated rig file; no parameter has this value
+_SENTINEL = 1.2345678901e-211  # placeholder for values in a generated rig file; no parameter has it
 
 
 @dataclass(frozen=True)
 class OwnFile:
-    """Template of a rig file, and the source of each parameter in it, from which a page saves a file.
+    """Template of the rig file that a page saves, and the source of each parameter in the user's file.
 
     Attributes
     ----------
@@ -33,10 +33,11 @@ class OwnFile:
     given: Mapping[str, ParameterSource]
 
     def source_fields(self, name: str) -> dict[str, Any]:
-        """Data on the source of a parameter in the file: ``own`` has its unit as written, the unit in SI, and its text.
+        """Data on a parameter's source in the file: ``own`` is its unit as written, size of the unit in SI, and text.
 
-        ``factor`` and ``unit`` are added if the file gives a value per unit area of a rig with totals; ``si`` for the
-        opposite case; ``was`` is the value in the file if that of the rig differs.
+        ``factor`` and ``unit`` are added if the file gives a value per unit area of a rig with totals; ``si`` in the
+        opposite case; ``was`` is the value in the file if the rig's differs. Empty if the file does not give the
+        parameter.
         """
         own = self.given.get(name)
         if own is None:
@@ -61,7 +62,7 @@ def own_file(rig: Slider | Machine, names: Sequence[str], text: str) -> OwnFile:
 
 
 def display_unit(rig: Slider | Machine, unit: str) -> tuple[float, str]:
-    """Factor and unit in which a page shows a parameter: SI units, of sliders told in forces those of totals."""
+    """Factor and unit in which a page displays a parameter: SI units, for sliders given in forces those of totals."""
     return outside(unit, display_area(unit, rig.area))
 
 
@@ -79,7 +80,7 @@ def _file_pieces(rig: Slider | Machine, names: Sequence[str], found: RigTemplate
 
 
 def _slot(rig: Slider | Machine, names: Sequence[str], name: str, before: str) -> list[Any]:
-    """Slot of a parameter: index, text before and text after its number in SI units per unit area (all digits kept)."""
+    """Slot of a parameter: index, text before and text after its number (SI units per unit area, all digits)."""
     unit = rig.parameters()[name].role.unit
     return [names.index(name), before, ""] if unit == "1" else [names.index(name), f'{before}"', f' {unit}"']
 

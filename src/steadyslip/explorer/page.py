@@ -1,4 +1,4 @@
-"""`explore`: the browser page of a rig as an object that is shown, saved, opened or made a widget."""
+"""`explore`: the browser page of a rig, as an object that can be displayed, saved, opened or turned into a widget."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Explorer(HtmlDocument):
     rig : Slider or Machine
     branch : int
     text : str
-        Text of the rig file that the rig was read from; empty if not given.
+        Text of the file that the rig was read from; empty if not given.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -34,7 +34,7 @@ class Explorer(HtmlDocument):
     text: str = field(default="", repr=False)
 
     def widget(self) -> Any:
-        """Page as a notebook widget, with the values on the page in ``widget.values`` and ``widget.rig``.
+        """Notebook widget of the page, with the page's values in ``widget.values`` and ``widget.rig``.
 
         Raises
         ------
@@ -50,29 +50,29 @@ class Explorer(HtmlDocument):
 def explore(
     rig: Slider | Machine, *, title: str = "rig", branch: int = 0, source: str | PathLike[str] | None = None
 ) -> Explorer:
-    """Interactive page that shows how the verdict on a rig depends on its parameters.
+    """Interactive page on which the verdict on a rig follows changes of its parameters.
 
     Parameters
     ----------
     rig : Slider or Machine
-        With any laws, including those of users.
+        Rig with any laws, including your own.
     title : str, optional
         Title of the page.
     branch : int, optional
-        Index of the steady state where there are several, by rising normal stress.
+        Index of the steady state if several exist, by rising normal stress.
     source : path, optional
-        File that the rig was read from: the page shows values in its units, and saves it with its comments.
+        File that the rig was read from: the page shows values in its units, and saves them with its comments.
 
     Returns
     -------
     Explorer
-        Shown in a notebook; ``save("page.html")`` writes it, ``open()`` shows it in the browser.
+        Notebooks display it; ``save("page.html")`` writes it to a file, ``open()`` opens it in the browser.
 
     Raises
     ------
     NotAvailable
-        If an equation has a delay or a function that cannot be printed as JavaScript, or numbers leave the range of
-        floating point.
+        If an equation has a delay or a function without JavaScript equivalent, or numbers leave the range of floating
+        point.
     ParameterError
         If `branch` is not 0 for a machine, which has one steady state.
     RigFileError

@@ -1,6 +1,6 @@
-"""Programs for a page from expressions of a Model.
+"""Programs for a page, generated from expressions of a Model.
 
-Each program reads the array R (parameters in the order of the Model, then σss of every contact) and writes the array y.
+Each program reads the array R (parameters in the order of the Model, then σss of every contact) and writes array y.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ Then = Callable[[list[Node]], Sequence[Value]]
 def program(
     model: Model, name: str, expressions: Sequence[Any], further: Sequence[sp.Symbol] = (), then: Then | None = None
 ) -> Program:
-    """Program that evaluates expressions in the parameters of a Model, σss and `further` symbols, read in this order.
+    """Program that evaluates expressions of a Model's parameters, σss and `further` symbols, read in this order.
 
-    With `then`, a function of the values (nodes), its results are stored instead of the values.
+    With `then`, a function of the list of values (nodes), its results are stored instead of the values.
 
     Raises
     ------
     NotAvailable
-        If an expression has a function that cannot be printed; the message names it.
+        If an expression has a function without JavaScript equivalent, which the message names.
     """
     made = Program(name)
     names = {symbol: f"p{i}" for i, symbol in enumerate((*model.arguments, *further))}

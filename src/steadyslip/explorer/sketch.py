@@ -1,8 +1,8 @@
-"""Sketch of a slider as SVG whose parts a page can move.
+"""Sketch of a slider as SVG with parts that a page can move.
 
 Moving parts have classes: ``ground`` (hatching that moves past the load point, with period ``data-period``), ``body``
-(the block and its load) and ``link`` (a spring or dashpot between the ends in ``data-ends``, drawn from 0 to 1 along
-itself). Colours are those of the surrounding text; letters are those of the manual. Lengths are SVG units.
+(block and its load) and ``link`` (spring or dashpot between the ends in ``data-ends``, drawn from 0 to 1 along its
+axis). Colours are those of the surrounding text; letters are those of the manual. Lengths are SVG units.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from collections.abc import Callable
 
 from steadyslip.machine.slider import Slider
 
-WIDTH, HEIGHT = 340, 174  # of the whole sketch
+WIDTH, HEIGHT = 340, 174  # size of the whole sketch
 GROUND_Y = 132.0  # y of the surface
-PERIOD = 10.0  # of the hatching of the ground
+PERIOD = 10.0  # period of the hatching of the ground
 BLOCK_LENGTH, TOP_Y = 80.0, 86.0  # length of the block, height of its top
-SPRING_Y = 108.0  # height at which the spring holds it
-SPRING_LENGTH = 130.0  # of the spring
-MAX_SPRING_ANGLE, MAX_SURFACE_ANGLE = 33.0, 7.0  # degrees that a spring and a surface are drawn at most
-_SPRING_TURNS = 7  # of a spring as it is drawn
+SPRING_Y = 108.0  # y at which the spring is attached to the block
+SPRING_LENGTH = 130.0  # length of the spring
+MAX_SPRING_ANGLE, MAX_SURFACE_ANGLE = 33.0, 7.0  # degrees: largest drawn angles of spring and surface
+_SPRING_TURNS = 7  # turns of a spring as drawn
 
 
 def sketch(rig: Slider) -> str:
@@ -29,7 +29,7 @@ def sketch(rig: Slider) -> str:
     Parameters
     ----------
     rig : Slider
-        With any contact; one without its own shape is drawn as a block on a plane.
+        Rig with any contact; a contact law without a shape is drawn as a block on a plane.
 
     Returns
     -------
@@ -69,14 +69,14 @@ def _arrow(start: tuple[float, float], end: tuple[float, float]) -> str:
 
 def _ground() -> str:
     marks = "".join(_path((x, GROUND_Y), (x - 8, GROUND_Y + 11)) for x in range(0, WIDTH + 30, int(PERIOD)))
-    # an <svg> of its own cuts off what is outside it; a clip path would need a name that is unique in the document
+    # a nested <svg> clips its contents; a clip path would need an id that is unique in the document
     place = f'x="10" y="{GROUND_Y}" width="{WIDTH - 20}" height="12" viewBox="10 {GROUND_Y} {WIDTH - 20} 12"'
     surface = _path((10, GROUND_Y), (WIDTH - 10, GROUND_Y))
     return f'<svg {place} stroke-width="1"><g class="ground">{marks}</g></svg>{surface}'
 
 
 def _gap(rig: Slider) -> float:
-    """Gap between block and surface for a film or a layer; else 0."""
+    """Gap between block and surface (SVG units) for a film or a layer; else 0."""
     return {"film": 5.0, "layer": 8.0}.get(rig.contact.shape().between, 0.0)
 
 
@@ -150,7 +150,7 @@ def _links(rig: Slider) -> str:
     middle, lines = ((x1 + x2) / 2, (y1 + y2) / 2), ""
     if rig.stiffness or rig.axial_stiffness:
         lines += _link(_zigzag(), (x1, y1 - apart), (x2, y2 - apart)) + _text(middle[0], middle[1] - apart - 10, "k")
-    else:  # a controller alone
+    else:  # only a controller
         lines += _path((x1, y1), (x2, y2), style='stroke-dasharray="2 5"')
     if rig.damping:
         lines += _link(_dashpot(), (x1, y1 + apart), (x2, y2 + apart)) + _text(middle[0], middle[1] + apart + 21, "c")
@@ -170,7 +170,7 @@ def _load(rig: Slider) -> str:
     return f'<g class="load">{bar}{point}{arrow}</g>'
 
 
-# -- parts of some contacts
+# -- additional parts for some contact laws
 
 
 def _wedge(rig: Slider) -> str:

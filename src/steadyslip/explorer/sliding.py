@@ -1,4 +1,4 @@
-"""Programs for steady sliding on a page: steady normal stresses of all contacts, or their residuals."""
+"""Programs for steady sliding on a page: steady normal stresses σss of all contacts, or their residuals."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from steadyslip.model.sliding import REFERENCE, friction_coefficient
 from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
 
 Rows = list[list[Value | None]]  # matrix of nodes; None is zero
-VALUES_PER_CONTACT = 5  # values of `steady` for each contact
+VALUES_PER_CONTACT = 5  # number of values of program `steady` for each contact
 
 
 def needs_search(model: Model) -> list[bool]:
-    """True for each contact whose steady normal stress has no formula and must be searched."""
+    """For each contact True if its steady normal stress has no formula and must be found by a root search."""
     if joint_equation(model) is not None:
         return [False] * len(model.contacts)
     return [not steady_equation(model, place).affine for place in range(len(model.contacts))]
@@ -28,9 +28,9 @@ def needs_search(model: Model) -> list[bool]:
 def steady_programs(model: Model) -> list[Program]:
     """Program ``steady``, and ``residual0``, ``residual1``, ... of the contacts whose σss must be searched.
 
-    ``steady`` stores `VALUES_PER_CONTACT` values: σss (NaN if there is none), slope of the normal stress, load left,
-    steady load and friction coefficient. For contacts that press on each other it stores all σss, then the coefficients
-    of the characteristic polynomial of their coupling matrix A, lowest power first.
+    ``steady`` stores `VALUES_PER_CONTACT` values per contact: σss (NaN if there is none), slope of the normal stress,
+    load left, steady load and friction coefficient. For contacts that press on each other it stores all σss, then the
+    coefficients of the characteristic polynomial of their coupling matrix A, lowest power first.
     """
     joint = joint_equation(model)
     if joint is not None:
@@ -60,9 +60,9 @@ def _formula(model: Model, place: int) -> list[sp.Expr]:
 
 
 def _joint_program(model: Model, joint: JointEquation) -> Program:
-    """Program that solves σ = A σ + b by Cramer's rule, and stores the characteristic polynomial of A behind.
+    """Program that solves σ = A σ + b by Cramer's rule, and stores σ, then the characteristic polynomial of A.
 
-    With `JointEquation.bends` it takes the solution that `JointEquation.solve` takes.
+    With `JointEquation.bends` it chooses the solution as `JointEquation.solve` does.
     """
     n = joint.size
     sigmas = [contact.sigma_ss for contact in model.contacts]
@@ -95,7 +95,7 @@ def _joint_program(model: Model, joint: JointEquation) -> Program:
 
 
 def _solution(values: list[Value | None], n: int, signs: Sequence[float]) -> tuple[list[Value], Any]:
-    """Solution of σ = A σ + b with the characteristic polynomial of A, and whether it holds with given signs."""
+    """Solution of σ = A σ + b and characteristic polynomial of A; node that is true if it agrees with `signs`."""
     a: Rows = [values[i * n : (i + 1) * n] for i in range(n)]
     right = values[n * n : n * n + n]
     left: Rows = [[_difference(1.0 if i == j else None, a[i][j]) for j in range(n)] for i in range(n)]

@@ -1,4 +1,4 @@
-"""Short names for the variables of minified JavaScript modules; properties, keys and strings keep theirs."""
+"""Short names for the variables of minified JavaScript modules; properties, keys and strings are unchanged."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ _GLOBAL = frozenset(
         "postMessage requestAnimationFrame self setTimeout window",
     )
 )
-"""Names of JavaScript and of browsers that the modules use; what they declare themselves must not be named so."""
+"""Global names of JavaScript and browsers used by the modules; modules must not declare variables of these names."""
 _BEFORE_BLOCK = frozenset({"", ")", "=>", ";", "{", "}", "else", "try", "finally", "do", "catch"})
 _BEFORE_NAME = frozenset({"get", "set", "async", "static"})
 
 
 class _Word(NamedTuple):
-    """A name in code: its text, and whether it is a variable, or key and variable in one, as in ``{ name }``."""
+    """A name in code: its text, True if a variable, and True if key and variable at once, as in ``{ name }``."""
 
     text: str
     is_variable: bool
@@ -45,7 +45,7 @@ class _Word(NamedTuple):
 def shorten_variables(text: str, known: Iterable[str]) -> str:
     """Minified modules in one scope, with short names for their variables, the shortest for the most frequent.
 
-    A variable has the same short name wherever its own name occurs, so that scopes need not be told apart.
+    A name is replaced by one short name wherever it occurs, so that scopes need not be distinguished.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def shorten_variables(text: str, known: Iterable[str]) -> str:
 
 
 def _words(text: str) -> Iterator[_Word | str]:
-    """The names in code, and the text between them."""
+    """Names in code as `_Word`, and the text between them."""
     tokens = [*_tokens(text), ("", False)]
     opened, before, in_class = ["block"], "", False
     for (token, is_name), (after, _), (behind, _) in zip(tokens, tokens[1:], [*tokens[2:], ("", False)], strict=False):
@@ -109,7 +109,7 @@ def _tokens(text: str) -> Iterator[tuple[str, bool]]:
 
 
 def _word(name: str, before: str, after: str, within: str) -> _Word:
-    """Tell a variable from a property by the tokens beside it and the kind of bracket around it."""
+    """`_Word` of a name: variable or property, by the tokens beside it and the kind of bracket around it."""
     if before in (".", "?."):
         return _Word(name, False)
     begins = within == "object" and before in ("{", ",")

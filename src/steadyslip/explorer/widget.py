@@ -1,4 +1,4 @@
-"""Explorer as a notebook widget whose values are shared with Python; needs anywidget."""
+"""Page of a rig as a notebook widget whose values are shared with Python; needs anywidget."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from steadyslip.machine.slider import Slider
 
 
 def widget(rig: Slider | Machine, title: str, branch: int, text: str = "") -> Any:
-    """Notebook widget of the explorer of a rig.
+    """Notebook widget of the interactive page of a rig.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def _widget_class() -> type:
 
         @traitlets.validate("values")
         def _checked(self, proposal: Any) -> dict[str, float]:
-            """All values after a change of some; raises ParameterError for a value that the rig does not allow."""
+            """All values after some have changed; raises ParameterError for a value that the rig does not allow."""
             known = getattr(self, "values", None) or {}
             together = {**known, **proposal["value"]}
             changed = {name: value for name, value in together.items() if value != self._origin.value(name)}

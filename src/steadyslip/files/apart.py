@@ -1,9 +1,9 @@
-"""Reading files of others in a process of its own, with limits: what a damaged file ends there, it ends alone.
+"""Reading of foreign file formats in a separate process with limits, so that a damaged file cannot end the program.
 
-The libraries of foreign formats believe what a file says of itself: a kilobyte may ask for gigabytes, for hours, or
-for an address that is none. A reader process does one job after another as long as each succeeds; jobs and answers
-are lines of JSON with arrays behind them. Its memory is limited from its start, its processor time for each job, both
-where the system has such limits (`resource`); a clock limits it everywhere.
+Libraries of foreign formats trust the file: a kilobyte may make them allocate gigabytes, run for hours, or read an
+invalid address. A reader process does one job after another as long as each succeeds; jobs and answers are lines of
+JSON followed by arrays. Its memory is limited from its start, its processor time for each job, both where the system
+has such limits (`resource`); elapsed time is limited everywhere.
 """
 
 from __future__ import annotations
@@ -28,46 +28,46 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem, Steady
 
 try:
     import resource
-except ImportError:  # Windows: the clock alone
+except ImportError:  # Windows: only elapsed time is limited
     resource = None  # type: ignore[assignment]
 
 MOST_MEMORY = 2**30
-"""Bytes of memory that a reader may write to."""
-MOST_ADDRESSES = 2**32  # bytes that it may reserve: more than it writes to, since allocators do so in advance
-LASTING = 2**28  # bytes: a reader that has grown beyond is ended, and its memory given back
-PATIENCE = 3.0 if resource is None else 30.0  # seconds on the clock for one of processor time: others need it too
+"""Largest memory of a reader process, bytes written to."""
+MOST_ADDRESSES = 2**32  # bytes of address space: more than `MOST_MEMORY`, since allocators reserve in advance
+LASTING = 2**28  # bytes: a reader grown beyond this is ended after its job, to free its memory
+PATIENCE = 3.0 if resource is None else 30.0  # elapsed seconds per second of processor time, shared with other programs
 _START = "import sys; sys.path[:] = sys.argv[1:]; from steadyslip.files.apart import serve; serve()"
-_readers: dict[int, subprocess.Popen[bytes]] = {}  # of this process, by its number: a fork has none
+_readers: dict[int, subprocess.Popen[bytes]] = {}  # reader by process id, so that a fork starts its own
 _one_at_a_time = threading.Lock()
 
 
 class Ended(Exception):
-    """The reader came to its end before it had an answer; the text says why."""
+    """Error: the reader process ended without an answer; the text is the reason."""
 
 
 def call(module: str, function: str, arguments: Sequence[Any], seconds: float) -> tuple[dict[str, Any], list[Array]]:
-    """What a function gives back in the reader process, or here where none can be started.
+    """Result of a function called in the reader process, or in this process if none can be started.
 
     Parameters
     ----------
     module, function : str
     arguments : sequence
-        Plain data, as JSON has it.
+        JSON-ready data.
     seconds : float
-        Of processor time, unless the function asks for `more_time`.
+        Limit of processor time, which the function can extend by `more_time`.
 
     Returns
     -------
     about : dict
-        Plain data.
+        JSON-ready data.
     arrays : list of ndarray
 
     Raises
     ------
     Ended
-        If it takes more memory or time than it may, or brings its process down.
+        If it exceeds the limits of memory or time, or crashes its process.
     SteadyslipError
-        What the function raises.
+        As raised by the function.
     """
     with _one_at_a_time:
         reader = _reader()
@@ -80,7 +80,7 @@ def call(module: str, function: str, arguments: Sequence[Any], seconds: float) -
         head: dict[str, Any] = {"last": True}
         try:
             job = {"module": module, "function": function, "arguments": list(arguments), "seconds": seconds}
-            head, arrays = _asked(reader, {**job, "folder": _folder()})
+            head, arrays = _exchange(reader, {**job, "folder": _folder()})
         except (OSError, EOFError, ValueError) as error:
             out_of_time = late.is_set() or _code(reader) == -getattr(signal, "SIGXCPU", 0)
             why = f"it takes more than {seconds:.0f} s" if out_of_time else "it breaks what reads it; it is damaged"
@@ -99,7 +99,7 @@ def call(module: str, function: str, arguments: Sequence[Any], seconds: float) -
 
 
 def _reader() -> subprocess.Popen[bytes] | None:
-    """The running reader, or a new one; None where a program cannot start Python again."""
+    """Running reader process, or a new one; None if Python cannot be started again (frozen programs)."""
     reader = _readers.get(os.getpid())
     if reader is not None and reader.poll() is None:
         return reader
@@ -120,11 +120,11 @@ def _reader() -> subprocess.Popen[bytes] | None:
 def _folder() -> str | None:
     try:
         return os.getcwd()
-    except OSError:  # it was removed
+    except OSError:  # the folder was removed
         return None
 
 
-def _asked(reader: subprocess.Popen[bytes], job: dict[str, Any]) -> tuple[dict[str, Any], list[Array]]:
+def _exchange(reader: subprocess.Popen[bytes], job: dict[str, Any]) -> tuple[dict[str, Any], list[Array]]:
     jobs, answers = cast(IO[bytes], reader.stdin), cast(BufferedReader, reader.stdout)
     jobs.write(json.dumps(job).encode() + b"\n")
     jobs.flush()
@@ -142,7 +142,7 @@ def _asked(reader: subprocess.Popen[bytes], job: dict[str, Any]) -> tuple[dict[s
 
 
 def _code(reader: subprocess.Popen[bytes]) -> int | None:
-    """How a reader ended that has closed its pipes."""
+    """Exit code of a reader that has closed its pipes; None if it is still running after 1 s."""
     with contextlib.suppress(subprocess.TimeoutExpired):
         return reader.wait(1.0)
     return None
@@ -157,7 +157,7 @@ def _end(reader: subprocess.Popen[bytes]) -> None:
     reader.kill()
     reader.wait()
     for pipe in (reader.stdin, reader.stdout):
-        with contextlib.suppress(OSError):  # what it was not able to write any more
+        with contextlib.suppress(OSError):  # of unwritten data
             cast(IO[bytes], pipe).close()
 
 
@@ -171,22 +171,22 @@ def _end_all() -> None:
 
 
 def serve() -> None:
-    """Do jobs until there are no more, one fails, or memory has been used up."""
+    """Run jobs from standard input until its end, until one fails, or until memory exceeds `LASTING`."""
     answers = os.fdopen(os.dup(1), "wb")
     with open(os.devnull, "wb") as nowhere:
-        os.dup2(nowhere.fileno(), 1)  # what libraries print is no answer
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is for who waits, and ends this process
+        os.dup2(nowhere.fileno(), 1)  # text printed by libraries must not mix with answers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the calling process, which ends this one
     if resource is not None:
         for limit, most in ((resource.RLIMIT_DATA, MOST_MEMORY), (resource.RLIMIT_AS, MOST_ADDRESSES)):
-            with contextlib.suppress(ValueError, OSError):  # there is a lower one already
+            with contextlib.suppress(ValueError, OSError):  # the system has a lower limit already
                 resource.setrlimit(limit, (most, most))
     for line in sys.stdin.buffer:
-        if not _answered(json.loads(line), answers):
+        if not _run_job(json.loads(line), answers):
             return
 
 
-def _answered(job: dict[str, Any], answers: IO[bytes]) -> bool:
-    """Do a job and write its answer; whether another may follow."""
+def _run_job(job: dict[str, Any], answers: IO[bytes]) -> bool:
+    """Run a job and write its answer; True if another may follow."""
     if job["folder"] is not None:
         os.chdir(job["folder"])
     if resource is not None:
@@ -211,7 +211,7 @@ def _answered(job: dict[str, Any], answers: IO[bytes]) -> bool:
 
 
 def more_time(seconds: int) -> None:
-    """Allow a job that has got so far more processor time; without effect outside of a reader."""
+    """Allow the running job more processor time; without effect outside a reader process."""
     if resource is not None and (now := resource.getrlimit(resource.RLIMIT_CPU)[0]) != resource.RLIM_INFINITY:
         _limit_time(now + seconds)
 
@@ -223,12 +223,12 @@ def _limit_time(seconds: float) -> None:
 
 def _has_grown() -> bool:
     if resource is None:
-        return True  # it cannot be known
+        return True  # memory cannot be measured
     return _peak() > LASTING
 
 
 def _peak() -> int:
-    """Most bytes of memory that this process had; on Linux `getrusage` counts those of the parent it began as."""
+    """Peak memory of this process in bytes; not by `getrusage` on Linux, which includes that of the parent process."""
     with contextlib.suppress(OSError, StopIteration), open("/proc/self/status", "rb") as file:
         return 1024 * int(next(line for line in file if line.startswith(b"VmHWM:")).split()[1])
     unit = 1 if sys.platform == "darwin" else 1024

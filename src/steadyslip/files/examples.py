@@ -1,4 +1,4 @@
-"""Example files that come with the package: a list of them, and copies to work on."""
+"""Example files that come with the package: list, text and copies."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from steadyslip.files.output import whole_file
 
 _PACKAGE = Path(__file__).parents[1]
 _PLACES = (_PACKAGE / "examples", _PACKAGE.parents[1] / "examples")
-"""Folder of the examples in an installed package, and in a checkout, which holds the only copy."""
+"""Folders of the examples: in an installed package, and in a checkout (the original)."""
 _HEADLINE = re.compile(r"(?s)# (.*?)(?:[.](?=\s+[A-Z])|[:;]\s|\?|\s\(|[.]?\s*\Z)")
-"""First statement of the comment at the head of a file, without what stands in brackets."""
+"""First statement of the comment at the head of a file, without text in brackets."""
 
 
 def example_files() -> dict[str, str]:
-    """First statement of each example file by its name, such as ``machines/feed-axis.toml``; data without any.
+    """First statement of each example file by name, such as ``machines/feed-axis.toml``; empty for data files.
 
     Raises
     ------
@@ -25,20 +25,20 @@ def example_files() -> dict[str, str]:
         If the package was installed without them.
     """
     folder = _folder()
-    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc")  # which pip compiles
+    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc")  # made by pip
     found = sorted(path.relative_to(folder).as_posix() for path in files)
     return {name: _headline(folder / name) for name in sorted(found, key=lambda name: (name.count("/"), name))}
 
 
 def copy_examples(folder: str | PathLike[str]) -> list[Path]:
-    """Paths of the example files, all of them copied into a folder, which is made if missing.
+    """Copy all example files into a folder, created if missing; returns their paths.
 
-    Files that are there already with the same content are left; nothing is written if one has other content.
+    Files that exist with the same content are kept; nothing is written if any file has other content.
 
     Raises
     ------
     NotAvailable
-        If a file of the folder differs from the example of that name, or cannot be written.
+        If a file in the folder differs from the example of that name, or a file cannot be written.
     """
     source, goal = _folder(), Path(folder)
     contents = {goal / name: (source / name).read_bytes() for name in example_files()}

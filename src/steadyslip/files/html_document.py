@@ -1,4 +1,4 @@
-"""HTML documents in one file, which can be written, opened in a browser and shown in a notebook."""
+"""HTML documents in one file, which can be saved, opened in a browser and displayed in a notebook."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class HtmlDocument:
         write_text(path, self.html)
 
     def open(self) -> Path:
-        """Show the document in the browser; returns the path of its temporary file.
+        """Open the document in the browser; returns the path of its temporary file.
 
         Raises
         ------
@@ -66,12 +66,12 @@ class HtmlDocument:
         return path
 
     def _repr_html_(self) -> str:
-        """HTML of a frame with the document, for notebooks."""
+        """HTML of a frame that contains the document, for notebooks."""
         return f'<iframe title="{html.escape(self.title)}" {FRAME} srcdoc="{html.escape(self.html)}"></iframe>'
 
 
 def write_page(result: Any, path: Path, kind: str, of: str = "", **options: Any) -> None:
-    """Write the document of a result, titled with its kind (``Run``) and what it is of: if not told, the file's name.
+    """Write the document of a result; its title is the kind (``Run``) and subject `of`, by default the file's name.
 
     Raises
     ------

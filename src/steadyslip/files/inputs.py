@@ -10,7 +10,7 @@ from pathlib import Path
 from steadyslip.core.errors import NotAvailable
 
 MOST_TEXT = 2**20
-"""Largest size of a typed file (rig, protocol, map, fit), bytes; chosen by trial, far above that of any."""
+"""Largest allowed size of a hand-written file (rig, protocol, map, fit), bytes; chosen by trial, far above any."""
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",
@@ -38,7 +38,7 @@ class UnreadableFile(NotAvailable):
 def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, private: bool = False) -> bytes:
     """Content of a regular file.
 
-    The file is opened first and checked then, so that nothing can replace it in between. Opening a pipe does not block,
+    The file is opened before it is checked, so that it cannot be replaced in between. Opening a pipe does not block,
     and no more bytes are read than allowed, whatever size the file system reports.
 
     Parameters
@@ -49,7 +49,7 @@ def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, priv
     links : bool
         True if `path` itself may be a symbolic link.
     private : bool
-        True to refuse a file that anybody else can change.
+        True to raise an error for a file that other users can change.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, priv
 
 
 def check_file(path: str | PathLike[str], most: int) -> int:
-    """Size of a file in bytes, after the checks of `read_bytes`; for files that another library will open by name.
+    """Size of a file in bytes, after the checks of `read_bytes`; for files that other libraries open by name.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def check_kind(name: str, found: os.stat_result) -> None:
 
 
 def is_private(found: os.stat_result) -> bool:
-    """True if a file or folder belongs to this user and nobody else may write to it, or if the system has no owners."""
+    """True if only this user, the owner, may write to a file or folder, or if the system has no owners."""
     if not hasattr(os, "getuid"):
         return True
     return found.st_uid == os.getuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)

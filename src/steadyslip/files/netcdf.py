@@ -1,8 +1,8 @@
 """Reader of the classic netCDF format (CDF-1 and CDF-2), which checks every size before it allocates.
 
 A file is a list of dimensions, attributes and variables, then the numbers of each variable in one piece, all
-big-endian (NetCDF Users Guide, appendix B). Record dimensions, which this program does not write, are refused. Arrays
-never take more memory than the file has bytes.
+big-endian (NetCDF Users Guide, appendix B). Record dimensions, which this program does not write, raise FormatError.
+Arrays never take more memory than the file has bytes.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import numpy as np
 from steadyslip.core.arrays import Array
 
 T = TypeVar("T")
-_DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12  # tags of lists in the header of netCDF classic
-_TYPES = {1: "i1", 2: "S1", 3: ">i2", 4: ">i4", 5: ">f4", 6: ">f8"}  # numbers of types there
-_MOST = 100_000  # most entries of all lists together; chosen by trial, far more than any file of ours has
-_LONGEST = 1000  # numbers of an attribute; ours have one
-_DEEPEST = 32  # dimensions of a variable; NumPy's limit up to version 1
+_DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12  # tags of lists in the header
+_TYPES = {1: "i1", 2: "S1", 3: ">i2", 4: ">i4", 5: ">f4", 6: ">f8"}  # NumPy types by type number in the header
+_MOST = 100_000  # most entries of all lists together; chosen by trial, far above files of this program
+_LONGEST = 1000  # most numbers of an attribute; this program writes one
+_DEEPEST = 32  # most dimensions of a variable: NumPy's limit up to version 1
 
 
 class FormatError(ValueError):
@@ -31,7 +31,7 @@ class FormatError(ValueError):
 
 @dataclass(frozen=True)
 class FileVariable:
-    """Array in a file.
+    """Variable (array) in a netCDF file.
 
     Attributes
     ----------
@@ -49,12 +49,12 @@ class FileVariable:
     content: memoryview = field(repr=False)
 
     def numbers(self) -> Array:
-        """Copy of the array in native byte order."""
+        """Copy of the array in native byte order, of shape `shape`."""
         stored = np.frombuffer(self.content, self.dtype).reshape(self.shape)
         return stored.astype(stored.dtype.newbyteorder("="))
 
     def texts(self) -> list[str]:
-        """Rows of a character array as text."""
+        """Rows of a character array of two dimensions as text."""
         width = self.shape[1]
         rows = (self.content[i * width : (i + 1) * width] for i in range(self.shape[0]))
         return [_text(row) for row in rows]
@@ -89,7 +89,7 @@ def read(content: bytes | memoryview) -> File:
 
 
 class _Reader:
-    """Parser of a header, from its beginning to its end."""
+    """Parser of a file's header, read from beginning to end."""
 
     def __init__(self, content: memoryview) -> None:
         self.content, self.place = content, 0
@@ -100,14 +100,14 @@ class _Reader:
         if magic not in (b"CDF\1", b"CDF\2"):
             raise FormatError("is not a classic netCDF file")
         self.offset = ">i" if magic == b"CDF\1" else ">q"
-        self.number()  # of records
+        self.number()  # number of records: not used
         dims = self.entries(_DIMENSIONS, self.dimension)
         self.dims = list(dims.items())
         attributes = self.entries(_ATTRIBUTES, self.attribute)
         return File(dims, attributes, self.entries(_VARIABLES, self.variable))
 
     def take(self, count: int) -> memoryview:
-        """Next bytes; padding up to a multiple of four is skipped."""
+        """Next `count` bytes; padding up to a multiple of four is skipped."""
         end = self.place + count
         if count < 0 or end > len(self.content):
             raise FormatError("ends too early")
@@ -122,7 +122,7 @@ class _Reader:
         return _text(self.take(self.number()))
 
     def entries(self, tag: int, entry: Callable[[], T]) -> dict[str, T]:
-        """List of named entries."""
+        """Named entries of the next list, each parsed by `entry`; raises FormatError unless it has the given tag."""
         found: dict[str, T] = {}
         kind, count = self.number(), self.number()
         self.listed += count

@@ -1,4 +1,4 @@
-"""Output files: allowed endings, checked before anything is computed; files replaced only when complete."""
+"""Output files: endings are checked before anything is computed; files are replaced only by complete ones."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ FIGURES = (".png", ".svg", ".pdf")
 
 
 class OutputClosed(Exception):
-    """Error: nobody reads the standard output any more, as after ``| head``."""
+    """Error: the reader of the standard output has closed it, as ``| head`` does."""
 
 
 @contextmanager
 def answering() -> Iterator[None]:
-    """Context that flushes the standard output at its end and translates write errors.
+    """Context that flushes the standard output at its end and translates errors of writing.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def answering() -> Iterator[None]:
 
 
 def discard_output() -> None:
-    """Redirect the standard output to nowhere, so that no write error occurs when Python exits."""
+    """Redirect the standard output to the null device, so that no write error occurs when Python exits."""
     with suppress(OSError, ValueError, AttributeError):
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, sys.stdout.fileno())
@@ -71,7 +71,7 @@ def check_output(paths: Iterable[Path], allowed: Sequence[str]) -> None:
 def write_by_ending(
     path: Path, writers: Mapping[str, Callable[[Path], object]], figure: Callable[[], Any], result: Any
 ) -> None:
-    """Write a file with the writer for its ending, or else as a figure (an Axes or an array of them) of a result.
+    """Write a file with the writer for its ending, else the figure (Axes or an array of Axes) of a result.
 
     Raises
     ------
@@ -93,15 +93,15 @@ def write_by_ending(
 
 @contextmanager
 def whole_file(path: str | PathLike[str], *, private: bool = False) -> Iterator[str]:
-    """Context with the name of a temporary file that replaces `path` when it was written without error.
+    """Context with the name of a temporary file that replaces `path` at the end, if no error occurred.
 
-    A symbolic link is followed, and its target replaced. A `private` file can be read by its owner only, and replaces a
-    link.
+    If `path` is a symbolic link, its target is replaced. A `private` file is readable by its owner only, and replaces
+    the link itself.
 
     Raises
     ------
     NotAvailable
-        If the file cannot be written, or `path` is a device, pipe or folder, which must not be replaced.
+        If the file cannot be written, or `path` is a device, pipe or folder.
     """
     target, temporary = Path(path) if private else Path(os.path.realpath(path)), ""
     _refuse_other_than_files(path, target)
@@ -123,7 +123,7 @@ def whole_file(path: str | PathLike[str], *, private: bool = False) -> Iterator[
 
 
 def _refuse_other_than_files(path: str | PathLike[str], target: Path) -> None:
-    """Raise an error unless the target is a file or absent; a name such as /dev/stdout is none, wherever it leads."""
+    """Raise an error unless the target is a file or absent; names such as /dev/stdout always raise one."""
     named = Path(os.path.abspath(path))
     place = any(named.is_relative_to(folder) for folder in _NO_FILES) and not named.is_relative_to("/dev/shm")
     if place or (target.exists() and not target.is_file()):

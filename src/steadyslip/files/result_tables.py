@@ -1,8 +1,8 @@
 """Results as files: named columns and a few attributes in one sealed netCDF file (`steadyslip.files.sealed`).
 
-The module that writes a kind of file declares its attributes and columns; reading compares names, types, dimensions,
-sizes and units with these before it makes an array. Damage is found by the seal; these checks are against files that
-somebody crafted.
+The module that writes a kind of file declares its attributes and columns. Reading compares names, types, dimensions,
+sizes and units with the declaration before it allocates arrays. The seal detects damage; these checks detect crafted
+files.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from steadyslip.files.netcdf import File, FileVariable, FormatError, read
 from steadyslip.files.output import check_output
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 
-_SIZES = "sizes"  # attribute with all dimensions: the format has no empty ones, so variables along them are left out
-_PART = re.compile(r"part([1-9][0-9]{0,4})\.(.+)", re.DOTALL)  # name in the table of a name in one of its parts
+_SIZES = "sizes"  # attribute with all dimension lengths: variables of length 0, which the format lacks, are left out
+_PART = re.compile(r"part([1-9][0-9]{0,4})\.(.+)", re.DOTALL)  # name of a variable or attribute of a part
 
 
 @dataclass(frozen=True)
 class ColumnRule:
-    """Declaration of a column.
+    """Declaration of a column of a result file.
 
     Attributes
     ----------
     dims : tuple of str
     unit : str
-        SI unit; empty for none.
+        SI unit; empty for text and indices.
     text : bool
         True for words, False for numbers.
     """
@@ -45,7 +45,7 @@ class ColumnRule:
 
 
 def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any, parts: Sequence[Any] = ()) -> None:
-    """Write an xarray.Dataset of floats and words; an existing file is replaced only when the new one is complete.
+    """Write an xarray.Dataset of floats and text; an existing file is replaced only when the new one is complete.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any, parts: 
     kind : FileKind
     dataset : xarray.Dataset
     parts : sequence of xarray.Dataset
-        Results that this one is made of, as they are written on their own; their names get ``part1.`` in front.
+        Results that this one contains, as they would be written alone; their names get the prefix ``part1.``, ...
 
     Raises
     ------
@@ -75,13 +75,13 @@ def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any, parts: 
 
 
 def _whole(dataset: Any) -> Any:
-    """Dataset with all sizes in an attribute, and without empty columns, which the format does not have."""
+    """Dataset with dimension lengths as an attribute, and without empty columns, which the format does not support."""
     kept = dataset.drop_vars([name for name, variable in dataset.variables.items() if not variable.size])
     return kept.assign_attrs({_SIZES: json.dumps(dict(dataset.sizes))})
 
 
 def _apart(file: File) -> list[File]:
-    """Split a file into its own content and its parts, in order."""
+    """Contents of a file, split into that of the result itself, then of its parts in order."""
     found: dict[int, File] = {0: File({}, {}, {})}
     for what in ("attributes", "variables"):
         for name, value in getattr(file, what).items():
@@ -96,16 +96,16 @@ def _apart(file: File) -> list[File]:
 
 
 class ExpectedTable:
-    """Open file whose attributes are checked, and whose columns are checked against a declaration.
+    """Result file whose attributes are checked when it is opened, and its columns when they are read.
 
     Parameters
     ----------
     path : str or path
     kind : FileKind
     attributes : mapping of str to type
-        What it must have.
+        Attributes that the file must have, and their types.
     of_parts : mapping of str to type, optional
-        What each of its parts must have, for a result that is made of others.
+        Attributes that each part must have, for a result that contains others.
 
     Attributes
     ----------
@@ -143,11 +143,11 @@ class ExpectedTable:
         self.sizes: dict[str, int] = sizes
 
     def fault(self, what: str) -> NotAvailable:
-        """Error for a file whose content is not as declared."""
+        """Error, to be raised by the caller, for a file whose content is not as declared."""
         return NotAvailable(f"cannot read {str(self.path)!r}: as a {self.kind.name}, {what}; {self.kind.remedy}")
 
     def json(self, text: Any, form: Any) -> Any:
-        """Data of a declared form (see `fits_form`) from JSON text.
+        """Data from JSON text, checked against a form (see `fits_form`).
 
         Raises
         ------
@@ -162,12 +162,12 @@ class ExpectedTable:
         return found
 
     def columns(self, expected: Mapping[str, ColumnRule]) -> dict[str, Any]:
-        """All columns: arrays of float64 or lists of words.
+        """All columns by name: arrays of float64, or lists of text.
 
         Raises
         ------
         NotAvailable
-            If there are others, or one is not as declared.
+            If a column is missing, unexpected or not as declared.
         """
         dims = {dim for column in expected.values() for dim in column.dims}
         self._compare("dimensions", self.sizes, dims)
@@ -210,8 +210,9 @@ _TYPES = {str: "text", int: "a whole number", float: "a number"}
 def fits_form(value: Any, form: Any) -> bool:
     """True if JSON data have a declared form.
 
-    A form is a type, ``[form]`` for a list, ``(form, form)`` for a list of that length, ``{name: form}`` for exactly
-    these names, ``{str: form}`` for any names, or ``{form, None}`` for an optional value. Integers are valid floats.
+    A form is a type, ``[form]`` for a list, ``(form, form)`` for a list of that length, ``{name: form}`` for a dict
+    with exactly these names, ``{str: form}`` for any names, or ``{form, None}`` for an optional value. Integers pass as
+    floats.
     """
     if isinstance(value, int) and abs(value) >= 2**63:
         return False

@@ -1,12 +1,12 @@
-"""Sealed files, which this program writes and reads again: with kind, version of the layout and checksum.
+"""Sealed files: results written and read by this program, with kind, version of the layout and checksum.
 
 A sealed file ends in one line of text after its content::
 
     steadyslip run 2 <sha256 of the purpose> <sha256 of all before>
 
-Other programs can still open it by its ending, because they ignore what follows their own content. Reading checks
-size, kind, version and checksum first. The seal finds damage and mistakes; it is no signature, so the content is
-checked as well.
+Other programs can still open the file, since they ignore data after the content of their format. Reading first checks
+size, kind, version and checksum. The seal detects damage and mistakes; it is no signature, so the content is checked
+as well.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from steadyslip.files.inputs import read_bytes
 from steadyslip.files.output import whole_file
 
 _LINE = re.compile(rb"\nsteadyslip ([a-z]{1,20}) ([0-9]{1,6}) ([0-9a-f]{64}) ([0-9a-f]{64})\n\Z")
-_LONGEST = 180  # upper bound of the length of that line, bytes: at most 170
-_DIGEST = 65  # bytes of its last field
+_LONGEST = 180  # upper bound of the length of the seal line, bytes: at most 170
+_DIGEST = 65  # bytes of the last field of the seal line, with line end
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class FileKind:
 
 
 def seal(content: bytes, kind: FileKind, of: str = "") -> bytes:
-    """Sealed content; `of` is the purpose, which has to be the same when it is read."""
+    """Content with its seal appended; `of` is the purpose, which must be given again for reading."""
     line = f"\nsteadyslip {kind.name} {kind.version} {_name(of)} ".encode()
     digest = hashlib.sha256(content)
     digest.update(line)
@@ -58,7 +58,7 @@ def seal(content: bytes, kind: FileKind, of: str = "") -> bytes:
 
 
 def unseal(raw: bytes, path: str | PathLike[str], kind: FileKind, of: str = "") -> memoryview:
-    """Content of a sealed file, after all checks.
+    """Content of a sealed file without its seal, after all checks.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def write_sealed(
     Raises
     ------
     NotAvailable
-        If it cannot be written, or is too large to be read again.
+        If it cannot be written, or exceeds the size allowed for reading.
     """
     sealed = seal(content, kind, of)
     if len(sealed) > kind.most:
@@ -106,7 +106,7 @@ def write_sealed(
 
 
 def read_sealed(path: str | PathLike[str], kind: FileKind, of: str = "", *, private: bool = False) -> memoryview:
-    """Content of a file written by `write_sealed`; `private` refuses a file that anybody else can change.
+    """Content of a file written by `write_sealed`; `private` raises an error if other users can change the file.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def read_sealed(path: str | PathLike[str], kind: FileKind, of: str = "", *, priv
 
 
 def holds(path: str | PathLike[str], kind: FileKind) -> bool:
-    """Whether the last line of a file says that it is of this kind; its content is not checked.
+    """True if the seal line of a file names this kind; the content is not checked.
 
     Raises
     ------

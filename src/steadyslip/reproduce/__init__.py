@@ -1,6 +1,6 @@
 """Figures and numbers of Dupont & Bapna (1994), recomputed with this package.
 
-`drawings.py` has the rig and the figures of the paper (list `FIGURES`), `paper_numbers.py` its numbers beside ours.
+`drawings.py` has the rig and the figures of the paper (`FIGURES`), `paper_numbers.py` compares its numbers with ours.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class OutputError(SteadyslipError, OSError):
 
 
 def reproduce(folder: str | PathLike[str], *, progress: bool | None = None) -> list[Path]:
-    """Write the paper's figures and the table of its numbers.
+    """Write the paper's figures and the table of its numbers to a folder; returns the paths of the files.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Rig and figures of Dupont & Bapna (1994): simulated motion (1, 2, 5, 6) and critical stiffness (7).
 
-The paper does not print the stiffnesses and starting points of its Figs 5 and 6; those used here are named in
-the figures. Its "closed" trajectory at k = k_cr is closed to linear order only: it is a very weak inward spiral
-(theory 6 gives its rate), invisible in the drawing.
+The paper does not state the stiffnesses and starting points of its Figs 5 and 6; those used here are printed in the
+figures. Its "closed" trajectory at k = k_cr is closed to linear order only: in fact it is a very weak inward spiral
+(rate in theory 6), invisible in the drawing.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ V0 = 1 * um / s
 
 
 def paper_rig(angle: float = -45 * deg) -> Slider:
-    """Inclined spring of the paper (section 4) at a spring angle (rad); stiffness 9 GPa/m, no mass.
+    """Rig of the paper (section 4): inclined spring at an angle (rad), stiffness 9 GPa/m, no mass.
 
-    The paper gives neither v0 nor a stiffness; both are round numbers without effect on dimensionless results.
+    The paper states neither v0 nor a stiffness; the round numbers used here do not affect dimensionless results.
     """
     rock = RateState(
         a=0.0145, b=0.0160, d_c=D_C, mu_ref=0.7, v_ref=V0, evolution=Slip(), normal_memory=LinkerDieterich(alpha=0.56)
@@ -40,15 +40,15 @@ def paper_rig(angle: float = -45 * deg) -> Slider:
     return Slider(friction=rock, contact=contact, stiffness=9 * GPa / m, drive=SteadyDrive(V0))
 
 
-SIGMA = 5 * MPa  # normal stress of Figs 1 and 2: the preload of `paper_rig`
+SIGMA = 5 * MPa  # normal stress of Figs 1 and 2, Pa: the preload of `paper_rig`
 STEP_TIME = 1.0  # time of the step in Figs 1 and 2, s
-DIRECT_TIME = 1e-4  # time after the step at which its direct effect is read, s: 1e-4 of d_c/v0
+DIRECT_TIME = 1e-4  # time after the step at which the direct effect is read, s: 1e-4 of d_c/v0
 _STIFF = 1e16  # stiffness of the rig of Figs 1 and 2, Pa/m: a million times critical, so that slip follows the drive
 
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """Figure of the paper: stem of its file names, and a function that draws it on given Axes."""
+    """Figure of the paper: stem of its file names, and function that draws it on given Axes and returns them."""
 
     name: str
     draw: Callable[[Any], Any]
@@ -59,7 +59,7 @@ def _figure_7(ax: Any) -> Any:
 
 
 def simulate_shear(protocol: Any, slip: float = 8 * D_C) -> History:
-    """Simulated shear of the rock of the paper in a stiff machine at constant normal stress, over a slip in m."""
+    """Simulated shear of the paper's rock in a stiff machine at constant normal stress, up to a slip (m)."""
     paper = paper_rig()
     rig = Slider(
         friction=paper.friction, contact=ConstantNormalStress(preload=SIGMA), stiffness=_STIFF, drive=paper.drive
@@ -68,7 +68,7 @@ def simulate_shear(protocol: Any, slip: float = 8 * D_C) -> History:
 
 
 def _plot_step(ax: Any, run: History, direct: str, evolution: str) -> Any:
-    """Plot shear stress over slip, with labels at the direct and the evolving part of its change."""
+    """Plot change of shear stress over slip, with labels at its direct and its evolving part."""
     change = (run["shear_stress"] - run["shear_stress"][0]) / SIGMA
     slip = run["slip"] / D_C
     ax.plot(slip, change, color=palette.BLUE)
@@ -101,7 +101,7 @@ def _figure_2(ax: Any) -> Any:
 
 
 def simulate_orbit(angle: float, stiffness: float, cycles: float = 4.0, kick: float = 0.5) -> History:
-    """Simulated motion of the quasistatic inclined spring, started at x = 0 with velocity e^kick v0.
+    """Simulated motion of the quasistatic inclined spring from x = 0 with velocity e^kick v0.
 
     Angle in rad, stiffness in Pa/m; `cycles` is the duration in periods at the edge.
     """

@@ -1,7 +1,7 @@
-"""Equations of Dupont & Bapna (1994) evaluated with the parameters of the paper, beside our numbers.
+"""Numbers from the equations of Dupont & Bapna (1994) with the paper's parameters, compared with ours.
 
-The paper prints one such number only. Ours come from the Model's critical stiffness, eigenvalues and boundaries, or
-from simulated motion, and not from the closed forms of `steadyslip.paper`.
+The paper itself prints only one such number. Ours come from the Model's critical stiffness, eigenvalues and
+boundaries, or from simulated motion; not from the closed forms of `steadyslip.paper`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from steadyslip.units import deg
 
 @dataclass(frozen=True)
 class PaperNumber:
-    """Number from an equation or figure of the paper, beside ours.
+    """Number from an equation or figure of the paper, with ours.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class PaperNumber:
         Equation or figure of the paper.
     quantity, unit : str
     expected, found : float
-        The equation evaluated to 18 digits (for figures, a value from its parameters), and ours from the Model.
+        Value of the equation to 18 digits (for figures, a value from its parameters), and value from the Model.
     printed : str
         The number as printed in the paper; empty if it prints none.
     """
@@ -60,7 +60,7 @@ class PaperNumber:
 
     @property
     def difference(self) -> float:
-        """Relative difference, |found/expected − 1|."""
+        """Relative difference |found/expected − 1|."""
         return abs(self.found / self.expected - 1)
 
     def cells(self) -> tuple[str, ...]:
@@ -78,7 +78,7 @@ class PaperNumber:
 
 @dataclass(frozen=True)
 class PaperTable:
-    """Table of numbers of the paper beside ours, as text, Markdown or CSV."""
+    """Table that compares numbers of the paper with ours, as text, Markdown or CSV."""
 
     rows: tuple[PaperNumber, ...]
     header = ("source", "quantity", "unit", "printed", "equation", "steadyslip", "relative difference")
@@ -110,7 +110,7 @@ class PaperTable:
         return text.getvalue()
 
 
-# From eqs 25-28, 30 and 31 at 25 digits, with the parameters of the paper; keys: spring angles in degrees;
+# Values of eqs 25-28, 30 and 31, computed with 25 digits and the paper's parameters. Keys: spring angles in degrees;
 # values: dimensionless unless a unit is given.
 _KAPPA = {
     -45: 0.00174418604651162791,
@@ -131,7 +131,7 @@ _M_STAR = 0.01  # dimensionless mass of the rows with mass, below m*_cr2 of all 
 
 @lru_cache(maxsize=1)
 def paper_table() -> PaperTable:
-    """Table of the equations of the paper in numbers beside ours, with relative differences."""
+    """Table that compares the equations of the paper, in numbers, with ours."""
     rows = [
         PaperNumber(
             "eq. 25", _quantity("k_cr", -45), "Pa/m", _STIFFNESS, float(critical_stiffness(paper_rig(-45 * deg)))
@@ -181,7 +181,7 @@ def _frequency(angle: float, m_star: float = 0.0) -> float:
 
 
 def _motion_numbers() -> tuple[PaperNumber, ...]:
-    """Numbers of Figs 1, 2 and 5 from simulated motion, limited by the finite time of a step or size of a kick."""
+    """Numbers of Figs 1, 2 and 5 from simulated motion; the finite time of a step and size of a kick limit accuracy."""
     rise, settled = _step_response(VelocityStep(at=STEP_TIME, to=float(np.e) * V0))
     share = 0.01
     jump, final = _step_response(NormalStressStep(at=STEP_TIME, by=share * SIGMA))

@@ -37,7 +37,7 @@ class Window(Displayed):
     cost: float
     area: float | None = field(default=None, repr=False)
     told: tuple[float, str] | None = field(default=None, repr=False)
-    """Factor from SI and unit in which the values are printed, as `Rig.told` returns them for 1."""
+    """Factor from SI and unit in which the values are printed, as `Rig.display_value` returns them for 1."""
     written_as: WrittenAs = field(default=WrittenAs(), repr=False)
     """Notation of the parameter in the rig's file, kept in printed values."""
     beyond: tuple[str, float] | None = None

@@ -1,8 +1,8 @@
 """Rig files: TOML text to and from a `Slider`, `Machine`, `Protocol` and further tables, and their JSON schema.
 
-No parameter is listed here: keys, units, domains and defaults are those that records declare, and maps and fits pass in
-the tables that they declare (`read.read_contents`). Opening a file never executes code; laws are found by
-registered name or installed entry point.
+No parameter is listed here: keys, units, domains and defaults are those that records declare; maps and fits pass the
+tables that they need (`read.read_contents`). Opening a file never executes code; laws are found by registered name or
+installed entry point.
 """
 
 from steadyslip.files.specifications.changes import named_value

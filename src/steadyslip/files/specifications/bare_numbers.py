@@ -1,4 +1,4 @@
-"""Questions about numbers without a unit and values that a law doubts, asked once where a rig file is read."""
+"""Warnings about implausible values of a rig file, mainly numbers without a unit, given once when it is read."""
 
 from __future__ import annotations
 
@@ -16,34 +16,35 @@ from steadyslip.core.quantities import parse, units_in
 from steadyslip.files.specifications.contact_sizes import G
 from steadyslip.files.specifications.held_bodies import friction_at_rest, is_of_forces, mass_on
 from steadyslip.files.specifications.other_units import number_of
-from steadyslip.files.specifications.sizes import questions_of_size
+from steadyslip.files.specifications.sizes import size_warnings
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.structures import StructureBody
 
 SPEEDS = ("m/s", "rad/s")
 STIFFNESSES = ("N/m", "Pa/m")
-STRETCHED = 1.0  # m: what friction stretches the softest of real axes and presses by is some 10 mm
-FAST = 1.0  # m/s: the speed of seismic slip; faster contacts exist, but whoever types 20 may mean um/s or mm/min
-FASTEST = 3e8  # m/s, of light: beyond, a number is refused in other words than those on its unit
+STRETCHED = 1.0  # m: friction stretches the softest real axes and presses by some 10 mm
+FAST = 1.0  # m/s, speed of seismic slip: faster contacts exist, but a bare 20 may mean um/s or mm/min
+FASTEST = 3e8  # m/s, speed of light: faster values get another error
 
 
 class Largest(NamedTuple):
-    """Largest of known values, from where a number without a unit is questioned, SI units, and what it is largest of.
+    """Largest known value of a kind of parameter, and the value above which a bare number gets a warning; SI units.
 
-    Between `ABSURD` times the latter and it another unit, per cent or the reciprocal may be meant.
+    Between that limit and `ABSURD` times it, another unit, per cent or the reciprocal may be meant. `of` says whether
+    the largest is in use or measured.
     """
 
     value: float
-    questioned: float
+    limit: float
     of: str = "in use"
 
 
-ABSURD = 1e4  # times the questioned value: mm for m, 1e3, and ten more; numbers beyond are of rigs without dimensions
+ABSURD = 1e4  # times the limit: 1e3 for mm given as m, and ten more; larger numbers are of dimensionless rigs
 LARGEST = {
     ("slip distance", "m"): Largest(0.1, 0.5, "measured"),
-    ("stress share", "1"): Largest(0.6, 3.0, "measured"),  # a and b may be of forces, without a load
-    ("mu_coulomb", "1"): Largest(1.5, 7.5, "measured"),  # of rubber; of joints, per load of a bearing, up to 5
+    ("stress share", "1"): Largest(0.6, 3.0, "measured"),  # a and b may be forces, if no load is given
+    ("mu_coulomb", "1"): Largest(1.5, 7.5, "measured"),  # rubber; joints, per load of a bearing, up to 5
     ("mu_static", "1"): Largest(1.5, 7.5, "measured"),
     ("mu_ref", "1"): Largest(1.5, 7.5, "measured"),
     ("resolution", "m"): Largest(1e-4, 5e-4),  # magnetic scales
@@ -58,51 +59,51 @@ LARGEST = {
     ("transmitted", "1"): Largest(2.0, 10.0),
     ("area", "m^2"): Largest(5.0, 50.0),
 }
-"""By kind of parameter or last part of its name, and SI unit."""
-WITH_UNIT = 10.0  # times as far as without one is asked about what has a unit, as rings of telescopes are 30 m wide
+"""Largest values by (kind of parameter or last part of its name, SI unit)."""
+WITH_UNIT = 10.0  # factor on the limit for values with a unit, as rings of telescopes are 30 m wide
 REMEDIES = {
     "gear": 'its second body turns faster than the first; a reduction is written "1/{raw:g}", this one "{raw:g}/1"',
     "stribeck_exponent": "write that of exp(-(v/v_stribeck)^exponent)",
     "1": "a number in per cent is written as a share, {share:g}",
     "": "write the unit that is meant",
 }
-"""What to write instead, by last part of the name, else by SI unit, else for all."""
-UNDAMPED = 1e-4  # of critical damping, below which nobody gives a dashpot: steel alone has some 1e-4 to 1e-3
-SLOWEST_MOTOR = 1e-4  # rad/s, a turn in 17 h: below it the speed given for a motor may be that behind its gear
-LEAST_REDUCTION = 5.0  # of a gear in front of a motor that is asked about so; direct drives do turn as slowly
-BENT = 2e-4  # m: by how much friction bends bristles at most before it slides; measured are some um to 0.1 mm
-LIGHTEST = 1000.0  # Pa: 10 cm of water; faults and laboratories have ten times as much and more
-LIGHT = 0.05  # share of its weight by which a body is hardly ever pressed
-BEYOND_LAW = 1e5  # speed over a law's own beyond which it is questioned: laboratories span some five decades
+"""Advice by last part of the name, else by SI unit, else ("") for all."""
+UNDAMPED = 1e-4  # share of critical damping below which a dashpot is implausible: steel alone has 1e-4 to 1e-3
+SLOWEST_MOTOR = 1e-4  # rad/s, a turn in 17 h: a slower motor may be meant as the speed behind its gear
+LEAST_REDUCTION = 5.0  # least gear reduction for that warning; direct drives do turn as slowly
+BENT = 2e-4  # m: largest plausible bend of bristles before sliding; measured are some um to 0.1 mm
+LIGHTEST = 1000.0  # Pa, 10 cm of water: faults and laboratories have at least ten times as much
+LIGHT = 0.05  # least plausible load on a contact, as share of the body's weight
+BEYOND_LAW = 1e5  # largest plausible speed over a law's own: laboratories span some five decades
 
 
-def question_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iterable[str]) -> None:
-    """Warn of speeds without a unit where the others have one, or far beyond the speeds of the friction.
+def warn_of_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iterable[str]) -> None:
+    """Warn (UnitWarning) of implausible values of a rig file.
 
-    Also of stiffnesses without a unit that friction would stretch far, of numbers far above all in use or far below,
-    of an encoder that is not where its step counts, of values that a friction law doubts, and, where all this is in
-    order, of sizes that no machine has.
+    They are: speeds without a unit where others have one, or far beyond the speeds of the friction law; stiffnesses
+    without a unit that friction would stretch far; numbers far above or below all in use; an encoder that is not where
+    its step counts; values that a friction law warns of; and, without other warnings, sizes that no machine has.
 
     Parameters
     ----------
     rig : Slider or Machine
     read : mapping of str to (object, str)
-        Names of the values read, each as it was written and with its SI unit.
+        Values by dotted name: as written in the file, and their SI unit.
     written : iterable of str
-        Units that stand in the file. Where all are SI's own, as programs write them, only speeds are asked about.
+        Units in the file. If all are SI units, as in files by programs, only speeds are checked.
     """
     by_programs = all(unit(name)[0] == 1.0 for name in written)
     large = {} if by_programs else dict(_large(rig, read))
-    found = [*_questions(rig, read)]
+    found = [*_speeds(rig, read)]
     if not by_programs:
         found += [*_soft(rig, read), *large.values(), *_light(rig, read), *_pliable(rig, read)]
         found += [*_undamped(rig, read), *_idle(rig)]
-        found += [] if found else [text for _, text in questions_of_size(rig, read)]
+        found += [] if found else [text for _, text in size_warnings(rig, read)]
     for text in (*found, *_doubts(rig, large)):
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 
-def _questions(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
+def _speeds(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
     for si in SPEEDS:
         own = {name: raw for name, (raw, its) in read.items() if its == si}
         bare = {name: raw for name, raw in own.items() if isinstance(raw, (int, float)) and 0 < abs(raw) <= FASTEST}
@@ -117,11 +118,11 @@ def _questions(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _doubts(rig: Rig, questioned: Collection[str]) -> Iterator[str]:
-    """What friction laws doubt, once for all contacts of which it is the same; without those questioned already."""
+    """Warnings of friction laws on their values, once for contacts with equal ones; without values `questioned`."""
     found: dict[str, list[str]] = {}
     for one in rig.laws_by_contact().values():
         if any(name.startswith(f"{one.prefix}friction.mu_") for name in questioned):
-            continue  # what a law doubts is how these compare
+            continue  # a law's warnings compare these values
         for text in one.friction.doubts():
             found.setdefault(text, []).append(one.prefix)
     if isinstance(rig, Machine):
@@ -132,7 +133,7 @@ def _doubts(rig: Rig, questioned: Collection[str]) -> Iterator[str]:
 
 
 def _structure_doubts(rig: Machine) -> Iterator[str]:
-    """What structures doubt, and contacts at points that do not move along the slide."""
+    """Warnings of structures, and of contacts at points that cannot move along or across the slide."""
     structures = {name: body for name, body in rig.bodies.items() if isinstance(body, StructureBody)}
     own_doubts = {name: list(body.doubts()) for name, body in structures.items()}
     for name, texts in own_doubts.items():
@@ -157,7 +158,7 @@ def _structure_doubts(rig: Machine) -> Iterator[str]:
 
 
 def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Questions about stiffnesses without a unit that the load of a contact would stretch by `STRETCHED` or more."""
+    """Warnings of stiffnesses without a unit that the load of a contact would stretch by `STRETCHED` or more."""
     presses = max(
         (rig.load_of(f"{prefix}friction") or 0.0 for prefix, *_ in rig.laws_by_contact().values()), default=0.0
     )
@@ -173,7 +174,7 @@ def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _large(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[tuple[str, str]]:
-    """Names and questions of numbers that are far above `LARGEST`, without a unit or in another than is meant."""
+    """Names and warnings of numbers far above `LARGEST`, without a unit or with a wrong one."""
     parameters = rig.parameters()
     for name, (raw, si) in read.items():
         last, one = name.rpartition(".")[2], parameters.get(name)
@@ -181,18 +182,18 @@ def _large(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[tuple[str,
         if known is None or (last.startswith("mu_") and is_of_forces(rig, name)):
             continue
         largest = f"the largest {known.of} are some {format_quantity(known.value, si)}"
-        if _is_between(raw, known.questioned, ABSURD * known.questioned):
+        if _is_between(raw, known.limit, ABSURD * known.limit):
             remedy = (REMEDIES.get(last) or REMEDIES.get(si) or REMEDIES[""]).format(raw=raw, share=raw / 100)
             yield name, f"{name} = {raw:g} is read as {format_quantity(float(raw), si)}; {largest}: {remedy}"
         elif isinstance(raw, str):
             number, further = number_of(raw, si) or 0.0, 1.0 if si == "1" else WITH_UNIT
-            if number > further * known.questioned:
+            if number > further * known.limit:
                 remedy = (REMEDIES.get(last) or REMEDIES[""]).format(raw=number)
                 yield name, f"{name} = {raw}; {largest}: {remedy}"
 
 
 def _undamped(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Question about a damping below 1 without a unit that hardly damps: it may be a damping ratio."""
+    """Warning of a damping below 1 without a unit that hardly damps: a damping ratio may be meant."""
     name, raw, area = "slider.damping", read.get("slider.damping", (None, ""))[0], rig.area or 1.0
     own = (float(rig.parameters()[one].value or 0.0) * area if one in rig.parameters() else 0.0
            for one in ("slider.mass", "slider.stiffness"))  # fmt: skip
@@ -206,7 +207,7 @@ def _undamped(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _idle(rig: Rig) -> Iterator[str]:
-    """Question about a motor that turns as slowly as only what is behind its gear does."""
+    """Warning of a motor that turns so slowly that the speed behind its gear may be meant."""
     if (
         not isinstance(rig, Machine)
         or not rig.drive.turns
@@ -226,7 +227,7 @@ def _idle(rig: Rig) -> Iterator[str]:
 
 
 def _pliable(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Questions about bristles without a unit that are far softer than all measured."""
+    """Warnings of bristle stiffnesses without a unit that are far softer than all measured."""
     for name in rig.of_kind("bristle stiffness"):
         raw, si = read.get(name, (None, ""))
         friction = friction_at_rest(rig, name)
@@ -239,7 +240,7 @@ def _pliable(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _light(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Questions about loads without a unit that hardly press: far less than a body weighs, or than `LIGHTEST`."""
+    """Warnings of loads without a unit that are far less than a body's weight, or less than `LIGHTEST`."""
     for name in rig.of_kind("normal stress"):
         raw, si = read.get(name, (None, ""))
         load, weight = rig.load_of(name), G * mass_on(rig, name)
@@ -262,14 +263,14 @@ def _is_between(raw: Any, low: float, high: float) -> bool:
 
 
 def _fits_better(number: float, texts: Sequence[str], si: str) -> bool:
-    """True if a number is nearer to the speeds of texts in the unit of one of them than in the SI unit."""
+    """True if a number, read in the unit of one of `texts`, is nearer to their speeds than in the SI unit."""
     speeds = [(abs(parse(text, si)), unit(name)[0]) for text in texts for name in units_in([text])]
     away = [(abs(math.log(number / v)), abs(math.log(number * factor / v))) for v, factor in speeds if v]
     return bool(away) and min(one for _, one in away) < min(one for one, _ in away)
 
 
 def _outrun(rig: Rig, speed: float) -> str:
-    """How far a speed is beyond those of the friction; empty if it is not."""
+    """Text on how far a speed (m/s) exceeds those of the friction law; empty if it is plausible."""
     kinds = ("reference rate", "velocity scale")
     own = {name: float(rig.value(name) or 0.0) for kind in kinds for name in rig.of_kind(kind)}
     if not any(own.values()) or speed < FAST or speed < BEYOND_LAW * max(own.values()):

@@ -1,4 +1,4 @@
-"""Changes such as ``contact.angle=10 deg`` to the tables of a rig file, and the names that they may use."""
+"""Changes such as ``contact.angle=10 deg`` to the tables of a rig file, and the parameter names allowed in them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from steadyslip.machine.slider import Slider
 def apply(text: str, tables: Table, lines: dict[str, int], section: Section | None = None) -> list[Problem]:
     """Write ``name=value`` into the tables and drop the line numbers of the old value; returns the problems.
 
-    `section` is the further table of the name, None for tables of the rig and protocol.
+    `section` is the additional table (map, fit) that has the name, None for tables of the rig and protocol.
     """
     name, equals, raw = split(text)
     if not equals or not name or not raw:
@@ -55,16 +55,16 @@ def apply(text: str, tables: Table, lines: dict[str, int], section: Section | No
     except ParameterError as error:
         return list(error.problems)
     place = ".".join([*path, last])
-    for key in [key for key in lines if f"{key}.".startswith(f"{place}.")]:  # a fault of the new value is not there
+    for key in [key for key in lines if f"{key}.".startswith(f"{place}.")]:  # no longer the line of its value
         del lines[key]
     return []
 
 
 def _keys_to(full: str, section: Section, tables: Table) -> list[str]:
-    """Keys on the path to a value of a further table.
+    """Keys on the path to a value of an additional table.
 
-    In tables of parameters by dotted name, the keys that the file already has for the same parameter are used, even if
-    either name is shortened.
+    In tables with parameters by dotted name, the keys that the file already has for that parameter are used, even if
+    one of the names is shortened.
     """
     keys = full.split(".")
     family: type[FrozenRecord] | None = section.family
@@ -86,7 +86,7 @@ def _keys_to(full: str, section: Section, tables: Table) -> list[str]:
 
 
 def _resolved(name: str, known: Mapping[str, Any]) -> str:
-    """Full name; the name itself if there is none."""
+    """Full name of a parameter; the given name if it is unknown."""
     try:
         return resolve(name, known)
     except UnknownNameError:
@@ -94,7 +94,7 @@ def _resolved(name: str, known: Mapping[str, Any]) -> str:
 
 
 def split(text: str) -> tuple[str, str, str]:
-    """Name, equals sign and value of a change; empty where missing."""
+    """Name, equals sign and value of a change as text; empty where missing."""
     name, equals, raw = (part.strip() for part in text.partition("="))
     return name, equals, raw
 
@@ -133,7 +133,7 @@ def value_of(raw: str, name: str) -> Any:
 
 
 def full_name(name: str, tables: Table) -> tuple[str, list[Problem]]:
-    """Full name for a name that may be shortened to its unique last part, and the problems."""
+    """Full name for a name that may be shortened to its unique last part, and the problems found."""
     known = dict.fromkeys(_known_names(tables))
     try:
         return resolve(name, known), []
@@ -143,7 +143,7 @@ def full_name(name: str, tables: Table) -> tuple[str, list[Problem]]:
 
 
 def _known_names(tables: Table) -> list[str]:
-    """All dotted names of the laws that the file chooses."""
+    """Dotted names of all parameters of the laws that the file chooses, and of its protocol."""
     names: list[str] = []
     machine = is_machine(tables)
     for section in machine_sections() if machine else sections():
@@ -164,7 +164,7 @@ def _known_names(tables: Table) -> list[str]:
 
 
 def _names_chosen(family: type[FrozenRecord], table: Table, prefix: str) -> list[str]:
-    """Names below a table that names its law."""
+    """Dotted names of the parameters of the law that a table names."""
     key, default = selector(family)
     chosen = table.get(key, default)
     law = family.registry.get(chosen) if isinstance(chosen, str) else None

@@ -1,6 +1,6 @@
-"""Questions about sizes at contacts that none has: loads, bristles, Stribeck velocities, viscosity, radii.
+"""Warnings of implausible sizes at contacts: loads, bristles, Stribeck velocities, viscosity, radii.
 
-Each compares a value with what else stands in the file, by a bound of physics or by what was measured.
+Each compares a value with other values of the file, by a bound of physics or by measured ranges.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from steadyslip.core.format import format_quantity
 from steadyslip.files.specifications.held_bodies import HeldBody, friction_at_rest, is_of_forces, mass_at, mass_on
 from steadyslip.files.specifications.other_units import (
     UNITS,
-    Question,
     Read,
-    asked,
+    SizeWarning,
     between,
+    hint,
     in_units,
     named,
     number_of,
@@ -28,19 +28,19 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 
 G = 9.81  # m/s^2
-LIGHT = 0.01  # share of its weight by which a body is hardly ever pressed: hanging and floating ones are by some 1 %
-OTHER_LOAD = 100.0  # times the load of which bristles are told to the contact's own
-THIN, THICK = 1e-8, 1e-3  # m: bends of bristles at which they slip; measured are 0.1 um to 0.1 mm, and of rubber more
-TURNED = 1.0  # rad: the most bristles of what turns bend by, at a motor in front of its gear
-OVERDAMPED = 3.0  # of critical damping of a mass on its bristles; published are 0.1 to 1
-UNCHANGED = 1e3  # times the speed of sliding, where friction is that at rest
+LIGHT = 0.01  # least plausible load as share of the body's weight: hanging and floating bodies have some 1 %
+OTHER_LOAD = 100.0  # largest plausible ratio of the load given with bristles to the contact's own, or its reciprocal
+THIN, THICK = 1e-8, 1e-3  # m: range of bends at which bristles slip; measured are 0.1 um to 0.1 mm, more for rubber
+TURNED = 1.0  # rad: largest bend of bristles on a turning body, such as a motor in front of its gear
+OVERDAMPED = 3.0  # times the critical damping of a mass on its bristles; published are 0.1 to 1
+UNCHANGED = 1e3  # Stribeck velocity over sliding speed above which friction is still that at rest
 SLOW_LAW = 1e-6  # m/s: measured Stribeck velocities are 0.1 mm/s to 1 m/s
-FASTEST = 300.0  # m/s: nothing that is to go on sliding is faster
-WIDE = 100.0  # times the radius of a ball of steel of the same inertia: light rims and arms are up to some 10 times
+FASTEST = 300.0  # m/s: nothing meant to go on sliding is faster
+WIDE = 100.0  # times the radius of a steel ball of equal inertia: light rims and arms have some 10 times
 
 
-def questions_of_contacts(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[Question]:
-    """Questions about the sizes at the contacts of a rig in forces, at most one for each parameter."""
+def contact_warnings(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[SizeWarning]:
+    """Warnings of sizes at the contacts of a rig in forces, at most one for each parameter."""
     light = list(_light(rig, read))
     yield from light
     if not light:
@@ -54,8 +54,8 @@ def questions_of_contacts(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) 
     yield from _radii(rig, read, bodies)
 
 
-def _light(rig: Rig, read: Read) -> Iterator[Question]:
-    """Questions about typed loads that hardly press: far less than a body weighs."""
+def _light(rig: Rig, read: Read) -> Iterator[SizeWarning]:
+    """Warnings of loads with a unit that are far less than the body's weight."""
     for name in rig.of_kind("normal stress"):
         load, weight = rig.load_of(name), G * mass_on(rig, name)
         if not isinstance(read.get(name, (None, ""))[0], str) or is_of_forces(rig, name):
@@ -65,11 +65,11 @@ def _light(rig: Rig, read: Read) -> Iterator[Question]:
             meant = named(name, texts_in_units(read, name, "N", between(0.1 * weight, 100 * weight)))
             meant += named("mass", mass)
             text = f"{written(read, name)} is {times(load / weight)} the weight of what slides there, "
-            yield name, f"{text}{format_quantity(weight, 'N')}: {asked(meant)}"
+            yield name, f"{text}{format_quantity(weight, 'N')}: {hint(meant)}"
 
 
-def _bristles(rig: Rig, read: Read) -> Iterator[Question]:
-    """Questions about bristles of another load than the contact's, or that bend unlike any that were measured."""
+def _bristles(rig: Rig, read: Read) -> Iterator[SizeWarning]:
+    """Warnings of bristles given for a load unlike the contact's, or that bend unlike all measured."""
     for name in rig.of_kind("bristle stiffness"):
         raw, load, value = read.get(name, (None, ""))[0], rig.load_of(name), rig.value(name)
         if not isinstance(raw, str) or is_of_forces(rig, name) or not (load and value):
@@ -81,7 +81,7 @@ def _bristles(rig: Rig, read: Read) -> Iterator[Question]:
             meant = named(own, texts_in_units(read, own, "N", between(0.1 * of_load, 10 * of_load)))
             meant += [f"{force} at {text}" for _, text in in_units(of, "N", between(0.1 * load, 10 * load))]
             text = f"{name} = {raw} is of a load {times(of_load / load)} that of its contact, "
-            yield name, f"{text}{format_quantity(load, 'N')}: {asked(meant)}"
+            yield name, f"{text}{format_quantity(load, 'N')}: {hint(meant)}"
         elif at_rest and not _bends_well(rig, name, at_rest / value):
             meant = []
             if of_load:
@@ -89,44 +89,44 @@ def _bristles(rig: Rig, read: Read) -> Iterator[Question]:
                 meant = [f"{text} at {of}" for _, text in found]
             bend = format_quantity(at_rest / value, "m")
             text = f"{name} = {raw}: friction bends such bristles by {bend} before they slip; measured are 0.1 um to "
-            yield name, f"{text}0.1 mm: {asked(meant)}"
+            yield name, f"{text}0.1 mm: {hint(meant)}"
 
 
 def _bends_well(rig: Rig, name: str, bend: float) -> bool:
-    """True if bristles that bend by this length (m) are like those of some contact."""
+    """True if a bend of bristles before slip (m) is within the plausible range."""
     radius = rig.contacts[name.split(".")[1]].radius if isinstance(rig, Machine) else None
     return THIN <= bend <= (TURNED * radius if radius else THICK)
 
 
-def _unchanged(rig: Rig, read: Read) -> Iterator[Question]:
-    """Questions about Stribeck velocities far above the speed of sliding, or below all that were measured."""
+def _unchanged(rig: Rig, read: Read) -> Iterator[SizeWarning]:
+    """Warnings of Stribeck velocities far above the sliding speed, or below all measured."""
     for prefix, *_ in rig.laws_by_contact().values():
         kinds = _kinds(rig, prefix)
         name = kinds.get("velocity scale", "")
         if "exponent" not in kinds or name not in read or not (scale := rig.value(name)):
             continue
         speed = _slip_speed(rig, prefix)
-        near = speed or math.sqrt(SLOW_LAW)  # m/s: the middle of those measured
+        near = speed or math.sqrt(SLOW_LAW)  # m/s: middle of the measured range
         meant = texts_in_units(read, name, "m/s", between(max(10 * SLOW_LAW, near / 10), UNCHANGED * near))
         if scale < SLOW_LAW:
-            yield name, f"{written(read, name)} is far below all that were measured, 0.1 mm/s to 1 m/s: {asked(meant)}"
+            yield name, f"{written(read, name)} is far below all that were measured, 0.1 mm/s to 1 m/s: {hint(meant)}"
         elif speed and scale > UNCHANGED * speed:
             text = f"{written(read, name)} is {times(scale / speed)} the speed of sliding, "
             text += f"{format_quantity(speed, 'm/s')}, at which friction is still that at rest: "
             if not meant and not isinstance(rig, Machine):
                 slow = texts_in_units(read, "drive.velocity", "m/s", between(scale / UNCHANGED, 10 * scale))
                 meant = named("velocity", slow)
-            yield name, text + asked(meant)
+            yield name, text + hint(meant)
 
 
 def _kinds(rig: Rig, prefix: str) -> dict[str, str]:
-    """Names of the parameters of the friction law at a contact by their kinds."""
+    """Names of the parameters of the friction law at a contact, by kind."""
     law = f"{prefix}friction."
     return {one.role.kind: name for name, one in rig.parameters().items() if name.startswith(law)}
 
 
-def _viscous(rig: Rig, read: Read) -> Iterator[Question]:
-    """Questions about viscous friction that hides a Stribeck curve."""
+def _viscous(rig: Rig, read: Read) -> Iterator[SizeWarning]:
+    """Warnings of viscous friction so large that it hides the Stribeck curve."""
     for prefix, *_ in rig.laws_by_contact().values():
         kinds = _kinds(rig, prefix)
         name, scale = kinds.get("viscosity", ""), kinds.get("velocity scale", "")
@@ -138,11 +138,11 @@ def _viscous(rig: Rig, read: Read) -> Iterator[Question]:
             text += f"more than friction at rest, {at_rest:.2g}, so that friction hardly falls: "
             load = rig.load_of(name) or 1.0
             meant = _per_load(read, name, "N s/m", load, between(0.0, 0.1 * at_rest / speed))
-            yield name, text + asked(meant)
+            yield name, text + hint(meant)
 
 
 def _per_load(read: Read, name: str, si: str, load: float, fits: Callable[[float], bool]) -> list[str]:
-    """The number of what is given per load in other units, or, of one without a unit, as a total at the load (N)."""
+    """Texts of a value per load with its number in other units or, without a unit, as a total at the load (N)."""
     raw = read[name][0]
     if isinstance(raw, str):
         total, at, of = raw.partition(" at ")
@@ -152,8 +152,8 @@ def _per_load(read: Read, name: str, si: str, load: float, fits: Callable[[float
     return [f"{raw:g} {one} at {format_quantity(load, 'N')}" for value, one in totals if fits(value / load)]
 
 
-def _bristle_damping(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[Question]:
-    """Questions about bristles that are damped far beyond what lets a mass swing on them."""
+def _bristle_damping(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[SizeWarning]:
+    """Warnings of bristles damped so strongly that a mass cannot oscillate on them."""
     body, kinds = bodies.get("slider"), _kinds(rig, "")
     name, bristles = kinds.get("bristle damping", ""), kinds.get("bristle stiffness", "")
     load = rig.load_of(name) if name else None
@@ -162,22 +162,22 @@ def _bristle_damping(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> It
     critical = 2 * math.sqrt((rig.value(bristles) or 0.0) / load * body.inertia)  # s/m
     if (rig.value(name) or 0.0) > OVERDAMPED * critical:
         text = f"{written(read, name)} is {times((rig.value(name) or 0.0) / critical)} the critical damping of "
-        text += f"{body.told} on its bristles; published are 0.1 to 1: "
-        yield name, text + asked(_per_load(read, name, "N s/m", load, between(0.0, critical)))
+        text += f"{body.text} on its bristles; published are 0.1 to 1: "
+        yield name, text + hint(_per_load(read, name, "N s/m", load, between(0.0, critical)))
 
 
-def _too_fast(rig: Rig, read: Read) -> Iterator[Question]:
-    """Question about a drive with which a contact slides faster than any."""
+def _too_fast(rig: Rig, read: Read) -> Iterator[SizeWarning]:
+    """Warning of a drive speed at which a contact slides faster than `FASTEST`."""
     for prefix, *_ in rig.laws_by_contact().values():
         if (speed := _slip_speed(rig, prefix)) > FASTEST:
             text = f"{written(read, 'drive.velocity')} makes {prefix.rstrip('.') or 'the slider'} slide at "
             meant = texts_in_units(read, "drive.velocity", "m/s", lambda v: v < FASTEST / 3)
-            yield "drive.velocity", f"{text}{format_quantity(speed, 'm/s')}: {asked(meant)}"
+            yield "drive.velocity", f"{text}{format_quantity(speed, 'm/s')}: {hint(meant)}"
             return
 
 
-def _radii(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[Question]:
-    """Questions about contacts far outside of the body that turns; 1 m stands for a radius that is not known."""
+def _radii(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[SizeWarning]:
+    """Warnings of contact radii far outside the turning body; 1 m stands for an unknown radius."""
     for name, surface in rig.contacts.items() if isinstance(rig, Machine) else ():
         body, radius, key = bodies.get(surface.held), surface.radius, f"contacts.{name}.radius"
         if body is None or not radius or not body.inertia or radius == 1.0 or key not in read:
@@ -185,11 +185,11 @@ def _radii(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[Que
         if radius > WIDE * body.ball:
             meant = texts_in_units(read, key, "m", between(0.1 * body.ball, 5 * body.ball))
             text = f"{written(read, key)} is {times(radius / body.ball)} the radius of a steel ball with the inertia "
-            yield key, text + f"of {body.name}, {body.told}: {asked(meant)}"
+            yield key, text + f"of {body.name}, {body.text}: {hint(meant)}"
 
 
 def _slip_speed(rig: Rig, prefix: str) -> float:
-    """Speed (m/s) of steady sliding at a contact; 0 where a place is held or it is not known."""
+    """Speed (m/s) of steady sliding at a contact; 0 if the drive holds a position or it is not known."""
     if rig.holds:
         return 0.0
     if not isinstance(rig, Machine):

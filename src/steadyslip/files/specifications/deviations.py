@@ -1,4 +1,4 @@
-"""Tolerances written in the values of a rig's tables, and the schemas of the tables beside them."""
+"""Tolerances written in the values of a rig's tables, and JSON schemas of the tables on tolerances."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ SCHEMA: Schema = {
         "description": "what may be changed, by dotted name: { from = ..., to = ..., cost = ... }",
     },
 }
-"""JSON schemas of the tables."""
+"""JSON schemas of the tables on tolerances, by table name."""
 
 
 def taken_out(tables: Table) -> tuple[dict[str, Tolerance], list[Problem]]:
-    """Tolerances written in the values of a rig's tables, which keep the values alone; and the problems."""
+    """Remove tolerances from the values of a rig's tables; returns them by dotted name, and the problems."""
     found: dict[str, Tolerance] = {}
     problems: list[Problem] = []
     names = dict.fromkeys(section.name for section in (*sections(), *machine_sections()))
@@ -64,7 +64,7 @@ def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[flo
     Raises
     ------
     ParameterError
-        Naming no field, if a deviation is of another dimension, both are zero, or a value that is not normally
+        With an empty name, if a deviation has another dimension, both are zero, or a value that is not normally
         distributed could leave its domain.
     """
     one = rig.parameters()[name]
@@ -94,10 +94,10 @@ def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[flo
 
 
 def wrong_ends(rig: Slider | Machine, written: Mapping[str, Tolerance]) -> list[Problem]:
-    """Problems of tolerances that were written in values, by the keys that lead to them."""
+    """Problems of the tolerances `written` in values, by dotted name."""
     problems: list[Problem] = []
     for path, tolerance in written.items():
-        with suppress(UnknownNameError):  # reported where tolerances are used
+        with suppress(UnknownNameError):  # reported when tolerances are used
             name = rig.resolve(path)
             if rig.parameters()[name].value is None:
                 continue

@@ -1,4 +1,4 @@
-"""Bodies of a rig in forces, and the springs that hold them: what questions about sizes compare."""
+"""Bodies of a rig in forces and the springs that hold them, for warnings of implausible sizes."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ YOUNG, SHEAR, DENSITY = 2.1e11, 8e10, 7850.0  # Pa, Pa, kg/m^3, of steel
 
 
 class HeldBody(NamedTuple):
-    """A body and what holds it in its direction of motion.
+    """A body, and the loads and springs on it in its direction of motion.
 
     Attributes
     ----------
     name : str
     turns : bool
     inertia : float
-        Mass (kg) or moment of inertia (kg m²); inf of ground and drive.
+        Mass (kg) or moment of inertia (kg m²); inf for ground and drive.
     pull, load : float
-        Friction at rest, and the constant force (N or N m).
+        Friction at rest, and constant force (both N or N m).
     speed : float
-        In steady sliding, m/s or rad/s; 0 where a place is held.
+        Speed in steady sliding, m/s or rad/s; 0 if the drive holds a position.
     springs : dict of str to float
-        Stiffness at the body (N/m or N m/rad) by the name of its parameter.
+        Stiffness at the body (N/m or N m/rad) by parameter name.
     """
 
     name: str
@@ -39,13 +39,13 @@ class HeldBody(NamedTuple):
     springs: dict[str, float]
 
     @property
-    def told(self) -> str:
-        """Inertia with its unit."""
+    def text(self) -> str:
+        """Inertia as text with its unit."""
         return format_quantity(self.inertia, "kg m^2" if self.turns else "kg")
 
     @property
     def block(self) -> float:
-        """Stiffness of a cube of steel as heavy (N/m), or of a cylinder as thick as long with its inertia (N m/rad)."""
+        """Stiffness of a steel cube of equal mass (N/m) or steel cylinder of equal inertia (N m/rad), long as thick."""
         if not self.turns:
             return YOUNG * math.cbrt(self.inertia / DENSITY)
         across: float = (32 * self.inertia / (math.pi * DENSITY)) ** 0.2
@@ -53,17 +53,17 @@ class HeldBody(NamedTuple):
 
     @property
     def ball(self) -> float:
-        """Radius (m) of a ball of steel with the moment of inertia of a body that turns."""
+        """Radius (m) of a steel ball with the moment of inertia of a body that turns."""
         radius: float = (15 * self.inertia / (8 * math.pi * DENSITY)) ** 0.2
         return radius
 
 
-APART = HeldBody("", False, math.inf, 0.0, 0.0, 0.0, {})
+FIXED_END = HeldBody("", False, math.inf, 0.0, 0.0, 0.0, {})
 """The ground, or the load point of the drive."""
 
 
 class HoldingSpring(NamedTuple):
-    """A spring between two bodies: stiffness (N/m or N m/rad) at the second, speed of that for one of the first."""
+    """A spring between two bodies: stiffness at the second (N/m or N m/rad), ratio of speeds of second and first."""
 
     stiffness: float
     ratio: float
@@ -72,24 +72,24 @@ class HoldingSpring(NamedTuple):
 
     @property
     def ends(self) -> list[tuple[HeldBody, float]]:
-        """Bodies at its ends, and the stiffness there."""
+        """Bodies at its ends (without ground and drive), each with the stiffness at that end."""
         both = ((self.first, self.stiffness * self.ratio**2), (self.second, self.stiffness))
-        return [one for one in both if one[0] is not APART]
+        return [one for one in both if one[0] is not FIXED_END]
 
     @property
     def frequency(self) -> float:
-        """Natural frequency (Hz) of the two ends against each other; inf where one has no inertia."""
+        """Natural frequency (Hz) of the two bodies on this spring; inf if one has no inertia."""
         inverse = sum(stiffness / body.inertia if body.inertia else math.inf for body, stiffness in self.ends)
         return math.sqrt(inverse) / (2 * math.pi)
 
     @property
     def heavier(self) -> tuple[HeldBody, float]:
-        """The slower of its ends on this spring, and the stiffness there."""
+        """Body with the lower natural frequency on this spring, and the stiffness at that end."""
         return min(self.ends, key=lambda one: one[1] / one[0].inertia if one[0].inertia else math.inf)
 
 
 def bodies_of(rig: Rig) -> dict[str, HeldBody]:
-    """Bodies of a rig by name, with no springs yet: of a slider one named ``slider``; without structures."""
+    """Bodies of a rig by name, without springs and structures; a slider has one, ``slider``."""
     if not isinstance(rig, Machine):
         pull = friction_at_rest(rig, "friction.any") * (rig.load_of("friction.any") or 0.0)
         mass = (rig.value("slider.mass") or 0.0) * (rig.area or 1.0)
@@ -109,16 +109,16 @@ def bodies_of(rig: Rig) -> dict[str, HeldBody]:
 
 
 def springs_of(rig: Rig, bodies: Mapping[str, HeldBody]) -> dict[str, HoldingSpring]:
-    """Springs along the motion by the names of their stiffnesses, which are noted at `bodies` too."""
+    """Springs along the motion by the name of their stiffness; also enters them in `bodies[...].springs`."""
     found = {}
     for name, link in rig.links.items() if isinstance(rig, Machine) else ():
-        ends = [APART if end not in rig.bodies else bodies.get(end) for end in link.between]
+        ends = [FIXED_END if end not in rig.bodies else bodies.get(end) for end in link.between]
         if link.rigidity() is not None and "x" in link.directions() and not any("." in end for end in link.between):
             first, second = (end for end in ends if end is not None)
             found[f"links.{name}.stiffness"] = HoldingSpring(float(link.rigidity()), float(link.ratio()), first, second)
     for name in rig.of_kind("stiffness"):
         if name.startswith("slider.") and (stiffness := (rig.value(name) or 0.0) * (rig.area or 1.0)):
-            found[name] = HoldingSpring(stiffness, 1.0, APART, bodies["slider"])
+            found[name] = HoldingSpring(stiffness, 1.0, FIXED_END, bodies["slider"])
     for name, spring in found.items():
         for body, stiffness in spring.ends:
             body.springs[name] = stiffness
@@ -126,22 +126,22 @@ def springs_of(rig: Rig, bodies: Mapping[str, HeldBody]) -> dict[str, HoldingSpr
 
 
 def mass_at(rig: Rig, name: str) -> str:
-    """Name of the mass of what slides at the contact whose parameter this is."""
+    """Name of the mass of the body that slides at the contact to which the parameter `name` belongs."""
     return f"bodies.{rig.contacts[name.split('.')[1]].body}.mass" if isinstance(rig, Machine) else "slider.mass"
 
 
 def mass_on(rig: Rig, name: str) -> float:
-    """Mass (kg) of the body that slides at the contact whose parameter this is; 0 if it is not known."""
+    """Mass (kg) of the body that slides at the contact to which the parameter `name` belongs; 0 if not known."""
     address = rig.parameters().get(mass_at(rig, name))
     return (address.value or 0.0) * (1.0 if isinstance(rig, Machine) else rig.area or 0.0) if address else 0.0
 
 
 def is_of_forces(rig: Rig, name: str) -> bool:
-    """True if the friction of a contact is given as forces, pressed with 1 N, so that no size is unusual."""
+    """True if the friction of a contact is given as forces (load 1 N), so that its coefficients may have any size."""
     return rig.load_of(name) == 1.0
 
 
 def friction_at_rest(rig: Rig, name: str) -> float:
-    """Friction coefficient at rest beside this parameter of a friction law; 0 if the law has none."""
+    """Static friction coefficient of the law to which the parameter `name` belongs; 0 if it has none."""
     address = rig.parameters().get(f"{name.rpartition('.')[0]}.mu_static")
     return address.value if address and address.value else 0.0

@@ -28,11 +28,11 @@ class Section:
     family : type of FrozenRecord
         Class (or base class) of the records that fill it.
     required : bool
-        True if a file read with it must have the table.
+        True if the table must not be missing.
     hint : str
-        Content to suggest in messages.
+        Content suggested in messages on a missing table.
     keyed : bool
-        True if it holds a table for each of some names chosen by the user.
+        True if it contains a table for each of some names chosen by the user.
     """
 
     name: str
@@ -43,21 +43,21 @@ class Section:
 
 
 PROTOCOL = Section("protocol", Protocol)
-"""Table for protocols, which a rig file may have besides those of the rig."""
+"""Table of the protocol, which a rig file may have besides those of the rig."""
 
 UNKNOWN = "unknown"
-"""Name of the table of intervals of unknown parameters; readers of the rig ignore it."""
+"""Name of the table of intervals of unknown parameters; ignored when a rig is read."""
 UNKNOWN_SCHEMA = {
     "type": "object",
     "description": "intervals of parameters that are not known, by dotted name: two numbers, or texts with units",
 }
 
 TOLD_IN = "# told in: "
-"""Beginning of the first line of a stored rig, before the units in which it and its results are told."""
+"""Beginning of the first line of a stored rig, before the units in which the rig and its results are printed."""
 MAP = "map"
 READ_ELSEWHERE = {MAP: "computes maps"} | dict.fromkeys(("record", "fit", "population"), "fits records")
-"""Names of tables that others ignore, and what reads them."""
-_OF_FAMILIES = ("law", "kind")  # keys whose words are told as those of the family; others say more, as motion does
+"""Names of tables that are ignored when a rig is read, and the kind of command that reads each."""
+_OF_FAMILIES = ("law", "kind")  # keys that messages replace by the family's name; others, such as motion, say more
 
 
 def sections() -> tuple[Section, ...]:
@@ -79,17 +79,17 @@ def is_machine(tables: Table) -> bool:
 
 
 def selector(family: type[FrozenRecord]) -> tuple[str, str | None]:
-    """Key that names the law in a table, and the law that is meant when it is absent."""
+    """Key that names the law in a table, and the default law if the key is absent (None: required)."""
     return family.chosen_by
 
 
 def has_choice(family: type[FrozenRecord]) -> bool:
-    """True if tables of this family name one of several laws."""
+    """True if tables of this family choose one of several laws."""
     return bool(family.registry) and not family.name
 
 
 def find_law(family: type[FrozenRecord], name: object) -> type[FrozenRecord]:
-    """Law of a family by registered name, or from an installed package that offers it.
+    """Law of a family by registered name, or by entry point of an installed package.
 
     Raises
     ------
@@ -125,8 +125,7 @@ def own_fields(law: type[FrozenRecord]) -> Iterator[tuple[Field[Any], Declared]]
 
 
 def nested_keys(table: Table, keys: Sequence[str]) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Pairs (keys, value) for every value of a table by dotted names, whose unquoted dots TOML turns into nested
-    tables.
+    """Pairs (keys, value) of a table by dotted names, whose unquoted dots TOML turns into nested tables.
 
     A table with a plain value under one of `keys` counts as a value.
     """

@@ -1,4 +1,4 @@
-"""Values as they would be in another unit, for questions: ``is "4.5 N m/arcsec" meant?``."""
+"""Values in other units that may be meant, for warnings such as ``is "4.5 N m/arcsec" meant?``."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 from steadyslip.core.dimensions import unit
 from steadyslip.core.quantities import parse, units_in
 
-Question = tuple[str, str]
-"""Name of a parameter, and the question about it."""
+SizeWarning = tuple[str, str]
+"""Name of a parameter, and the text of a warning about its value."""
 Read = Mapping[str, tuple[Any, str]]
-"""Values that were read by dotted name: each as it was written, and its SI unit."""
+"""Values of a file by dotted name: each as written, and its SI unit."""
 UNITS = {
     "N/m": ("N/um", "N/mm", "N/m"),
     "N m/rad": ("N m/rad", "N m/arcmin", "N m/arcsec", "kN m/rad"),
@@ -25,11 +25,11 @@ UNITS = {
     "m/s": ("mm/min", "mm/s", "m/min", "m/s"),
     "s": ("ms", "us"),
 }
-"""Units in which data sheets give what is asked about, by SI unit."""
+"""Units used in data sheets, by SI unit."""
 
 
 def number_of(text: str, si: str) -> float | None:
-    """SI value of a quantity; None if the text is none."""
+    """SI value of a quantity; None if the text is not a quantity of this unit's dimension."""
     try:
         return parse(text, si)
     except ValueError:
@@ -37,12 +37,12 @@ def number_of(text: str, si: str) -> float | None:
 
 
 def between(low: float, high: float) -> Callable[[float], bool]:
-    """Function that tells whether an SI value is between two others."""
+    """Predicate that is True for values between two others."""
     return lambda value: low < value < high
 
 
 def in_units(written: Any, si: str, fits: Callable[[float], bool]) -> list[tuple[float, str]]:
-    """SI values and texts of a number in those of `UNITS` in which it fits, without the one in which it is written."""
+    """SI value and text of a written number in each other unit of `UNITS` in which its value `fits`."""
     typed = next(iter(units_in([written])), "") if isinstance(written, str) else si
     value = number_of(written, si) if isinstance(written, str) else written
     if not typed or not isinstance(value, (int, float)) or isinstance(value, bool):
@@ -53,27 +53,27 @@ def in_units(written: Any, si: str, fits: Callable[[float], bool]) -> list[tuple
 
 
 def texts_in_units(read: Read, name: str, si: str, fits: Callable[[float], bool]) -> list[str]:
-    """The number of a value that was read in units in which it fits."""
+    """Texts of the number read for parameter `name` in each other unit in which its value `fits`."""
     return [text for _, text in in_units(read.get(name, (None, ""))[0], si, fits)]
 
 
 def named(name: str, texts: Iterable[str]) -> list[str]:
-    """Texts with the key before them, where a question is about another parameter as well."""
+    """Texts with the key before them, for warnings that suggest values of several parameters."""
     return [f"{name.rpartition('.')[2]} = {text}" for text in texts]
 
 
-def asked(texts: Iterable[str]) -> str:
-    """End of a question: the values that may be meant, or that the unit is to be written."""
+def hint(texts: Iterable[str]) -> str:
+    """End of a warning: values that may be meant or, without any, the advice to write the unit."""
     quoted = " or ".join(f'"{one}"' for one in texts)
     return f"is {quoted} meant?" if quoted else "write the unit that is meant"
 
 
 def written(read: Read, name: str) -> str:
-    """A parameter as it stands in the file."""
+    """Text of a parameter and its value as written in the file."""
     raw = read.get(name, ("", ""))[0]
     return f"{name} = {raw:g}" if isinstance(raw, (int, float)) else f"{name} = {raw}"
 
 
 def times(ratio: float) -> str:
-    """A ratio in words, to two digits."""
+    """Text of a ratio to two digits, such as ``250 times``."""
     return f"{float(f'{ratio:.2g}'):.7g} times"

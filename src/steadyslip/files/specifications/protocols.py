@@ -1,4 +1,4 @@
-"""Protocols from rig files and from command lines."""
+"""Reading of protocols from rig files and command lines."""
 
 from __future__ import annotations
 
@@ -71,7 +71,8 @@ def piece_from_text(text: str, area: float | None = None, machine: Slider | Mach
     area : float, optional
         Contact area of the rig, m^2; with it stresses are given as forces, as in a rig file.
     machine : Machine, optional
-        Machine that the piece acts on: takes forces, and angles where its load point turns. A slider changes nothing.
+        Machine that the piece acts on: values are then forces, and angles if its load point turns. No effect for a
+        slider.
 
     Raises
     ------

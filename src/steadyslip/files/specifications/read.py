@@ -20,7 +20,7 @@ from steadyslip.core.quantities import result_units, units_in, units_named
 from steadyslip.core.records import FrozenRecord
 from steadyslip.core.tolerances import Tolerance
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
-from steadyslip.files.specifications.bare_numbers import question_values
+from steadyslip.files.specifications.bare_numbers import warn_of_values
 from steadyslip.files.specifications.changes import apply, full_name, split
 from steadyslip.files.specifications.deviations import taken_out, wrong_ends
 from steadyslip.files.specifications.layout import (
@@ -38,7 +38,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
-CHANGES = "changes (--set)"  # where faults of what they give are, in place of a file
+CHANGES = "changes (--set)"  # title of errors in changes, in place of a file's name
 
 
 @checked()
@@ -55,7 +55,7 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider |
     Returns
     -------
     Slider or Machine
-        A machine where the file has tables of bodies, links or contacts.
+        A machine if the file has tables of bodies, links or contacts.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider |
 
 
 def read_whole(path: str | PathLike[str], changes: Iterable[str] = ()) -> RigFileContents:
-    """Contents of a rig file, with its problems."""
+    """Contents of a rig file, and the problems found in it; raises RigFileError only if it cannot be read as TOML."""
     return read_contents(_not_empty(text_of(path), str(path)), str(path), changes)
 
 
@@ -121,7 +121,7 @@ def slider_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()
 
 
 def protocol_of(text: str, source: str, changes: Iterable[str]) -> Protocol | None:
-    """Read the protocol of a TOML text, which may omit the tables of a rig."""
+    """Protocol of a TOML text, which may omit the tables of a rig; None if it has none."""
     found = read_contents(_not_empty(text, source), source, changes, rig_needed=False)
     found.refuse()
     return found.protocol
@@ -129,22 +129,22 @@ def protocol_of(text: str, source: str, changes: Iterable[str]) -> Protocol | No
 
 @dataclass(frozen=True)
 class RigFileContents:
-    """Contents of a rig file as far as valid, with the problems found in the others.
+    """Valid contents of a rig file, and the problems found in the rest.
 
     Attributes
     ----------
     rig : Slider, Machine or None
-        None if absent or faulty.
+        None if absent or invalid.
     protocol : Protocol or None
     further : dict of str to FrozenRecord
-        Records of the declared further tables; of a faulty table, its valid part.
+        Records of the additional tables requested; of an invalid table, its valid part.
     problems : list of Problem
     changed : set of str
-        Names of the values that changes replaced, as given and in full.
+        Names of the values replaced by changes, as given and in full.
     tables : dict
-        As parsed, with the changes.
+        Parsed tables, with the changes.
     tolerances : dict of str to Tolerance
-        Those written beside values, by the keys that lead to them.
+        Tolerances written in values, by dotted name.
     """
 
     source: str
@@ -158,13 +158,11 @@ class RigFileContents:
     tolerances: dict[str, Tolerance] = field(repr=False)
 
     def line(self, name: str) -> int | None:
-        """Line of a key, or of the table around it."""
+        """Line number (from 1) of a key, or of the table around it; None if not found."""
         return line_of(name, self.lines)
 
     def refuse(self, *others: Problem) -> None:
-        """Raise an error with all problems of the file and `others`, each with its line, or the change that made it;
-        does nothing without problems.
-        """
+        """Raise RigFileError if there are problems in the file or `others`; lists all, each with its line or change."""
         if self.problems or others:
             every = list(dict.fromkeys([*self.problems, *others]))
             if all(map(self._is_of_change, every)):
@@ -174,19 +172,19 @@ class RigFileContents:
             raise RigFileError(sorted(found, key=lambda p: (p.line is None, p.line or 0)), title=self.source)
 
     def _is_of_change(self, problem: Problem) -> bool:
-        """True for a problem with what a change gives, or with what it names, which is not in the file."""
+        """True for a problem caused by a change: by its value, or by a name that is not in the file."""
         name, line = problem.name, problem.line or self.line(problem.name)
         below = any(f"{name}.".startswith(f"{one.removesuffix('.law')}.") for one in self.changed)
         missing = line is None and any(one.startswith(f"{name}.") for one in self.changed)
         return problem.line is None and (missing or (below and name not in self.lines))
 
     def refuse_machine(self) -> None:
-        """Raise an error if the file describes a machine."""
+        """Raise NotAvailable if the file describes a machine."""
         if isinstance(self.rig, Machine):
             raise NotAvailable("the file describes a machine; allowed: a slider, one block on one surface")
 
     def checked_rig(self, *others: Problem) -> Slider | Machine:
-        """The rig of a file without problems.
+        """Rig of the file, if it has no problems.
 
         Raises
         ------
@@ -199,7 +197,7 @@ class RigFileContents:
         return self.rig
 
     def checked_slider(self, *others: Problem) -> Slider:
-        """The slider of a file without problems; also NotAvailable if the file describes a machine."""
+        """Slider of the file, if it has no problems; raises NotAvailable if the file describes a machine."""
         self.refuse_machine()
         return cast(Slider, self.checked_rig(*others))
 
@@ -208,7 +206,7 @@ def read_contents(
     text: str, source: str, changes: Iterable[str] = (), further: Sequence[Section] = (),
     complete: Callable[[Table], None] | None = None, rig_needed: bool = True,
 ) -> RigFileContents:  # fmt: skip
-    """Read a TOML text after making changes; problems are collected, except that it is not TOML.
+    """Read a TOML text with changes applied; problems are collected, except text that is not TOML.
 
     Parameters
     ----------
@@ -216,10 +214,10 @@ def read_contents(
     changes : iterable of str
         ``NAME=VALUE``.
     further : sequence of Section
-        Tables besides those of rig and protocol, with the records that declare them.
+        Tables to read besides those of rig and protocol.
     complete : callable, optional
-        Function that fills in values which tables may omit; called before changes of the rig, which may name what it
-        filled in, and again after them.
+        Function that fills in values which tables may omit; called before the changes of the rig, which may name
+        these values, and again after them.
     rig_needed : bool
         False if a text with only the protocol's table is valid.
 
@@ -265,7 +263,7 @@ def read_tables(
     for change in [change for change in every if change not in own]:
         changed.add(full_name(split(change)[0], tables)[0])
         reader.problems += apply(change, tables, lines)
-    if complete is not None and changed:  # laws that were changed have parameters of their own
+    if complete is not None and changed:  # a changed law may need other values
         complete(tables)
     tolerances, faults = taken_out(tables)
     reader.tables = with_structures(tables, source)
@@ -275,11 +273,11 @@ def read_tables(
     said = {name: one for name, one in found.items() if one is not None}
     if rig is not None:
         rig.set_display_units(sorted(result_units(tables))).named(Path(source).name if source.endswith(".toml") else "")
-        rig.set_parameter_units(units_named({name: raw for name, (raw, _) in reader.questioned.items()}))
+        rig.set_parameter_units(units_named({name: raw for name, (raw, _) in reader.values_read.items()}))
         faults += wrong_ends(rig, tolerances)
-        if rig.written_in:  # numbers alone are SI units, as programs write them
-            question_values(rig, reader.questioned, units_in(tables))
-    wrong = {one.name for one in faults}  # told once, as a tolerance
+        if rig.written_in:  # files without any unit are written by programs, in SI units
+            warn_of_values(rig, reader.values_read, units_in(tables))
+    wrong = {one.name for one in faults}  # reported once, as problems of tolerances
     problems = [*faults, *(one for one in reader.problems if one.name not in wrong)]
     return RigFileContents(source, rig, protocol, said, problems, changed, lines, tables, tolerances)
 

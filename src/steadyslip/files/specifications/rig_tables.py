@@ -1,4 +1,4 @@
-"""Reading of the tables of a rig: a slider's, a machine's, the protocol, further ones; problems are collected."""
+"""Reading of the tables of a slider or machine, the protocol and additional tables; problems are collected."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ from steadyslip.machine.servo import MachineDrive, wrong_control
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
-RIGID = 1e300  # N/m: read in place of "rigid", larger than any that is typed; the link is taken out of the machine
-LIKE = 0.6  # likeness of a misspelt table's name to the one that is meant: body and bodies
+RIGID = 1e300  # N/m: placeholder for "rigid", above all real ones; the link is then eliminated from the machine
+LIKE = 0.6  # least similarity of a misspelt table name to the one meant, as of body and bodies
 
 
 def _rigid(links: Any) -> tuple[Any, list[str]]:
-    """Tables of links with a placeholder number where the stiffness is ``rigid``, and the names of those links."""
+    """Tables of links with `RIGID` where the stiffness is ``rigid``, and the names of the rigid links."""
     if not isinstance(links, dict):
         return links, []
     names = [name for name, one in links.items() if isinstance(one, dict) and one.get("stiffness") == "rigid"]
@@ -56,7 +56,7 @@ def _rigid(links: Any) -> tuple[Any, list[str]]:
 
 
 def _joined(first: Table, second: Table) -> Table:
-    """Both tables in one, and of the values that both have the first's."""
+    """Two tables merged recursively; where both have a value, the first's."""
     both = {key: _joined(first[key], one) for key, one in second.items() if isinstance(first.get(key), dict)}
     return {**second, **first, **both}
 
@@ -90,7 +90,7 @@ class RigTableReader(TableReader):
         return self._machine() if is_machine(self.tables) else self._slider()
 
     def _is_of_both(self) -> bool:
-        """Report tables of a rig of one body beside those of a machine, as nothing else follows from them."""
+        """Report tables of a rig of one body beside those of a machine, a mixture that cannot be read; True if so."""
         single = {section.name for section in sections()} - {section.name for section in machine_sections()}
         both = [name for name in self.tables if name in single]
         if not (both and is_machine(self.tables)):
@@ -108,13 +108,13 @@ class RigTableReader(TableReader):
         return machine_sections() if is_machine(self.tables) else sections()
 
     def _misspelt(self, name: str, others: set[str]) -> None:
-        """Report a table nearly named as one of a rig's, and read it as that one, as nothing else follows from it."""
+        """Report a table with a misspelt name, and read it as the one meant, so that it causes no further problems."""
         table, own = self.tables[name], {section.name for section in self._own_sections()}
         if not isinstance(table, dict):
             return
         keyed = {section.name for section in machine_sections() if section.keyed}
         if name in keyed and "friction" in self.tables and not any(isinstance(one, dict) for one in table.values()):
-            own, keyed = {section.name for section in sections()}, set()  # of a slider, in the plural
+            own, keyed = {section.name for section in sections()}, set()  # a slider's table with its name in the plural
         meant = next(iter(get_close_matches(name, own | keyed, n=1, cutoff=LIKE)), None)
         if name in own | others or meant is None:
             return
@@ -125,9 +125,7 @@ class RigTableReader(TableReader):
         self.tables = _joined(rest, {meant: table})
 
     def _machine(self) -> Machine | None:
-        """Read a machine; if tables are faulty, references of the others to absent bodies and links are still
-        reported.
-        """
+        """Read a machine; despite invalid tables, references to absent bodies and links in others are reported."""
         before = len(self.problems)
         found: dict[str, Any] = {}
         rigid: list[str] = []
@@ -175,7 +173,7 @@ class RigTableReader(TableReader):
             table = table | {"velocity": 1.0 if value is None else value}
         elif law is not None and _is_quantity(given, "m/s" if law.turns else "rad/s"):
             table = table | {"velocity": 1.0}
-            if "velocity_of" in table:  # a name of no body, which is reported as such
+            if "velocity_of" in table:  # an unknown body, which `record` reports
                 return self.record(MachineDrive, table, "drive.")
             where = table.get("body", "the load point")
             does = "turns" if law.turns else "slides"
@@ -185,7 +183,7 @@ class RigTableReader(TableReader):
         return self.record(MachineDrive, table, "drive.")
 
     def _as_measured(self, table: Table, law: Any, bodies: Mapping[str, Any]) -> Table:
-        """Table of a drive in which what is of the measured body is read in its unit, if that is not the drive's."""
+        """Table of a drive with values of the measured body read in that body's unit, if only one of them turns."""
         measured = bodies.get(named) if isinstance(named := table.get("measured"), str) else None
         if law is None or measured is None or measured.turns == law.turns:
             return table
@@ -207,7 +205,7 @@ class RigTableReader(TableReader):
         return self._built(Slider, {**arguments, **parts}, "slider.")  # type: ignore[return-value]
 
     def protocol(self, rig: Rig | None = None) -> Protocol | None:
-        """Read the protocol, None if absent; after the rig, whose area it needs."""
+        """Read the protocol, None if absent; to be called after `rig`, whose area it needs."""
         if PROTOCOL.name not in self.tables:
             return None
         before = len(self.problems)
@@ -218,7 +216,7 @@ class RigTableReader(TableReader):
             return self._complete(Protocol, table, f"{PROTOCOL.name}.")  # type: ignore[return-value]
 
     def settings(self, section: Section) -> FrozenRecord | None:
-        """Read a further table; its quantities keep their declared units, whatever the rig's area."""
+        """Read an additional table; its quantities keep their declared units, whatever the rig's area."""
         table = self.tables.get(section.name)
         if not isinstance(table, dict):
             wanted = f"[{section.name}] {section.hint}" if section.hint else f"a table [{section.name}]"
@@ -245,7 +243,7 @@ class RigTableReader(TableReader):
             try:
                 self.area = Parameter("m^2", positive, "contact area").checked(raw)
             except ParameterError:
-                self.area = 1.0  # the area itself is reported with the slider's other keys; totals beside it are valid
+                self.area = 1.0  # reported later with the other keys; any area lets totals be read
 
     def _section(self, section: Section) -> FrozenRecord | None:
         key, default = selector(section.family)

@@ -1,4 +1,4 @@
-"""JSON schema of rig files, from the declarations of the records, for editors and other programs."""
+"""JSON schema of rig files for editors and other programs, generated from the declarations of records."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def rig_schema(further: Sequence[Section] = ()) -> Schema:
-    """Schema of a rig file with some further tables."""
+    """JSON schema of a rig file with the additional tables `further`."""
     properties: Schema = {}
     for section in sections():
         if section.family is Slider:
@@ -49,7 +49,7 @@ def rig_schema(further: Sequence[Section] = ()) -> Schema:
 
 
 def _by_key(family: type[FrozenRecord], doc: str) -> Schema:
-    """Schema of a table for each of some names."""
+    """Schema of a table that contains a table for each name."""
     one = _family(family) if has_choice(family) else _table(family, {}, _summary(family))
     return {"type": "object", "description": f"{doc}, a table for each name", "additionalProperties": one}
 
@@ -60,12 +60,12 @@ def protocol_schema() -> Schema:
 
 
 def further_schema(further: Sequence[Section]) -> Schema:
-    """Schemas of further tables, by name."""
+    """Schemas of additional tables, by name."""
     return {one.name: _table(one.family, {}, _summary(one.family)) for one in further}
 
 
 def partial(schema: Any) -> Any:
-    """Schema without required keys, for a file that omits what is not known."""
+    """Schema without required keys, for incomplete files."""
     if isinstance(schema, list):
         return [partial(one) for one in schema]
     if not isinstance(schema, dict):
@@ -118,7 +118,7 @@ def _value(role: Declared) -> Schema:
 
 
 def _by_dotted_name(role: Named, depth: int) -> Schema:
-    """Schema of a value or of nested tables of values, which unquoted dots of a name make."""
+    """Schema of a value, or of values in nested tables, which result from unquoted dots in names."""
     either = [_table(role.family, {}, _summary(role.family))]
     if role.listed:
         either.append({"type": "array", "items": {"anyOf": [{"type": "number"}, {"type": "string"}]}})

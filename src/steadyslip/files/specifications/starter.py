@@ -1,4 +1,4 @@
-"""Commented files to begin with: a rig with laws of one's choice, or an example of another kind of file."""
+"""Commented starting files: a rig with chosen laws, or an example of another kind of file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ EXAMPLES = {
     "machine": "machines/feed-axis.toml", "protocol": "stick-slip.toml", "fit": "fits/basalt.toml",
     "map": "maps/safe-stiffness.toml",
 }  # fmt: skip
-"""Commented example of each other kind of file."""
+"""Example file of each other kind."""
 KINDS = ("rig", *EXAMPLES)
 _WIDE = 30  # columns of key and value before the comment
 _HEAD = """# A rig to begin with: replace the numbers, then ask
@@ -34,14 +34,14 @@ _HEAD = """# A rig to begin with: replace the numbers, then ask
 
 
 def starter_text(kind: str = "rig", friction: str = "lugre", contact: str = "constant", drive: str = "steady") -> str:
-    """TOML text of a commented file to begin with.
+    """TOML text of a commented starting file.
 
     Parameters
     ----------
     kind : str
         One of `KINDS`.
     friction, contact, drive : str
-        Laws of a rig by the word used in files.
+        Names of the laws of a rig, as in files.
 
     Raises
     ------
@@ -62,13 +62,13 @@ def starter_text(kind: str = "rig", friction: str = "lugre", contact: str = "con
 
 
 def _fault(name: str, word: str) -> str:
-    """What is wrong with the law for a table; empty if nothing."""
+    """Message on an unknown law for the table `name`; empty if it is known."""
     family = next(section.family for section in sections() if section.name == name)
     return "" if word in (fit := _laws_of_sliders(family)) else unknown_name(family.family, word, fit)
 
 
 def _laws_of_sliders(family: type[FrozenRecord]) -> list[str]:
-    """Laws of a family but those of contacts that need a body that moves away from the surface."""
+    """Names of the laws of a family, without compliant contact laws, which need a body that can leave the surface."""
     usual = ContactLaw.is_compliant
     return [name for name, law in family.registry.items() if getattr(law, "is_compliant", usual) is usual]
 
@@ -84,7 +84,7 @@ def _table(section: Section, word: str) -> str:
 
 
 def _field(law: type[FrozenRecord], item: Field[Any], role: Declared) -> Iterator[str]:
-    """Lines of one key: with a value if the rig needs one or it is usual, else commented out."""
+    """Lines of one key with a value; commented out unless it is required or usual."""
     key = key_of(item)
     if isinstance(role, Part):
         if has_choice(role.family) and not role.many:
@@ -107,7 +107,7 @@ def _field(law: type[FrozenRecord], item: Field[Any], role: Declared) -> Iterato
 
 @cache
 def _usual_values() -> tuple[dict[str, str], dict[str, str], dict[str, list[str]]]:
-    """Values of a slow machine slide as TOML text by key, those of commented keys, and by law the keys left out."""
+    """Values of a slow machine slide as TOML text by key; those of keys commented out; keys left out by law."""
     text = resources.files(__package__).joinpath("starter.toml").read_text(encoding="utf-8")
     usual, _, rest = text.partition("[suggested]")
     suggested, _, _ = rest.partition("[not_beside]")
@@ -115,7 +115,7 @@ def _usual_values() -> tuple[dict[str, str], dict[str, str], dict[str, list[str]
 
 
 def _values(text: str) -> dict[str, str]:
-    """TOML text of each value by key."""
+    """TOML text of values by key, from lines ``key = value``."""
     lines = (line.partition(" = ") for line in text.splitlines() if " = " in line)
     return {key: value for key, _, value in lines}
 

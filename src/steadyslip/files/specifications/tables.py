@@ -1,4 +1,4 @@
-"""Reading of records from TOML tables, with all problems collected; works for any declared record."""
+"""Reading of any declared record from TOML tables; all problems are collected."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from steadyslip.machine.input_units import TURNING
 from steadyslip.machine.rig import Rig
 from steadyslip.protocol.protocol import DISTURBANCE, Piece
 
-ONE_NAME = 0.8  # likeness of two names of which one is the other misspelt: azimut and azimuth
+ONE_NAME = 0.8  # least similarity of a misspelt name to the one meant, as of azimut and azimuth
 
 
 class TableReader:
@@ -39,21 +39,21 @@ class TableReader:
         self.problems: list[Problem] = []
         self.area: float | None = None
         self.feed = 1.0, False
-        """Motion that is given for one of the drive, and True if what moves so turns: its displacements are angles."""
+        """Motion of the load point as given over that of the drive; True if it turns: displacements are then angles."""
         self.in_totals = False
         self.acted_on: Rig | None = None
         self.sections: tuple[Section, ...] = ()
-        """Tables of the file, where hints look for a key in the wrong one."""
-        self.questioned: dict[str, tuple[Any, str]] = {}
-        """Parameters that were read: as written, and their SI unit."""
+        """Declarations of the file's tables, used for hints on keys in the wrong table."""
+        self.values_read: dict[str, tuple[Any, str]] = {}
+        """Parameters read so far by dotted name: as written, and their SI unit."""
         self.twisted = False
-        """True while a torque is read in place of a force."""
+        """True while a torque is read instead of a force."""
 
     def problem(self, name: str, message: str) -> None:
         self.problems.append(Problem(name, message))
 
     def record(self, family: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
-        """Record described by a table; None after noting its problems."""
+        """Record described by a table; None if there were problems, which are collected."""
         if not has_choice(family):
             law, rest = family, table
         else:
@@ -71,9 +71,9 @@ class TableReader:
     def _left_unnamed(
         self, family: type[FrozenRecord], default: str, table: Table, prefix: str, able: Iterable[str] | None = None
     ) -> str:
-        """Report that a table has keys of another law than that without a name; the first that has them all, or "".
+        """Report a table without law name whose keys are not of the default law; returns the first law with all keys.
 
-        Only those that are `able` are named, if these are given.
+        Empty without such a law. With `able` only these laws are considered.
         """
         keys = {name: {key_of(item) for item, _ in own_fields(law)} for name, law in family.registry.items()}
         foreign = [name for name in table if name not in keys[default]]
@@ -91,7 +91,7 @@ class TableReader:
         return known[0]
 
     def _complete(self, law: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
-        """Record of a known law; if values are bad, contradictions between the others are still noted."""
+        """Record of a known law; if some values are invalid, contradictions between the others are still reported."""
         before = len(self.problems)
         outer, self.twisted = self.twisted, self._twists(law, table)
         with self._own_area(law, table):
@@ -106,7 +106,7 @@ class TableReader:
 
     @contextmanager
     def _own_area(self, law: type[FrozenRecord], table: Table) -> Iterator[None]:
-        """Context for a record that is read in totals: with its own area, or in forces without one."""
+        """Context in which a record declared in totals is read: with its own area, or in forces without one."""
         outer = self.area, self.in_totals
         if law.in_totals:
             self.area, self.in_totals = 1.0 if "area" in table else None, True
@@ -117,7 +117,7 @@ class TableReader:
 
     @contextmanager
     def of_rig(self, rig: Rig | None) -> Iterator[None]:
-        """Context for what acts on a rig: on a machine in forces, and in angles where its load point turns."""
+        """Context for protocols that act on a rig: for a machine in forces, and in angles if its load point turns."""
         outer = self.in_totals, self.feed, self.acted_on
         if rig is not None:
             self.in_totals, self.feed, self.acted_on = rig.in_forces, rig.feed(), rig
@@ -136,7 +136,7 @@ class TableReader:
         return self.acted_on.turns_on(on if isinstance(on, str) else None)
 
     def members(self, role: Part, raw: Any, name: str) -> Members | None:
-        """Records of tables by names that the user chooses."""
+        """Records from tables with names chosen by the user; None if there were problems."""
         if not isinstance(raw, dict):
             self.problem(name, f"got {repr_short(raw)}; allowed: a table for each, [{name}.NAME]")
             return None
@@ -155,11 +155,11 @@ class TableReader:
         return Members(found) if len(self.problems) == before else None
 
     def _of_one_spelling(self, raw: Table, name: str) -> Table:
-        """Tables by name; parts of one, tables as well, that are under nearly its name are reported and put there."""
+        """Tables by name, in which parts of a table found under a misspelt name are reported and merged into it."""
         tables = {key: one for key, one in raw.items() if isinstance(one, dict)}
         for key, part in tables.items():
             if not all(isinstance(one, dict) for one in part.values()):
-                continue  # a table with values of its own is not a part alone
+                continue  # a table with values is not just a part of another
             larger = [one for one, rest in tables.items() if len(rest) > len(part) and not set(rest) & set(part)]
             if meant := next(iter(get_close_matches(key, larger, n=1, cutoff=ONE_NAME)), None):
                 keys = enumerated(list(part))
@@ -182,7 +182,7 @@ class TableReader:
             return _stand_in(law, arguments, {}) if issubclass(law, Settings) else None
 
     def _arguments(self, law: type[FrozenRecord], table: Table, prefix: str) -> Table:
-        """Constructor arguments from a table; unknown, missing and bad keys are noted."""
+        """Constructor arguments from a table; unknown, missing and invalid keys are reported."""
         rest = dict(table)
         arguments: Table = {}
         missing: dict[str, Problem] = {}
@@ -216,14 +216,14 @@ class TableReader:
             self.problem(prefix + legible(name), told + another)
             for item, role in own_fields(law):
                 if f"did you mean {key_of(item)!r}?" in told and item.name not in arguments:
-                    missing.pop(key_of(item), None)  # it is there, misspelt: nothing else follows from that
+                    missing.pop(key_of(item), None)  # misspelt, so not missing
                     if (meant := self._value(role, value, prefix + name)) is not None:
                         arguments[item.name] = meant
         self.problems += missing.values()
         return arguments
 
     def _by_name(self, role: Part, rest: Table, prefix: str) -> tuple[FrozenRecord, ...]:
-        """Records of tables that are named after laws of a family; the tables are removed from `rest`."""
+        """Records from tables named after laws of a family; these tables are removed from `rest`."""
         found = []
         key = selector(role.family)[0]
         for name in [name for name, value in rest.items() if isinstance(value, dict)]:
@@ -239,7 +239,7 @@ class TableReader:
         return tuple(found)
 
     def _inline(self, item: Field[Any], role: Part, rest: Table, prefix: str, keys: list[str]) -> FrozenRecord | None:
-        """Record of a part that is named by a word, with its parameters beside it (evolution, c_nagata)."""
+        """Record of a part whose law is a value of the table, with its parameters beside it (evolution, c_nagata)."""
         raw = rest.pop(item.name, item.default.name if isinstance(item.default, FrozenRecord) else None)
         law = self._law(role.family, raw, prefix + item.name)
         if law is None:
@@ -250,7 +250,7 @@ class TableReader:
         return self._complete(law, mine, prefix)
 
     def _value(self, role: Declared, raw: Any, name: str) -> Any:
-        """Checked value; None after noting a problem."""
+        """Checked value; None after reporting a problem."""
         if isinstance(role, Part):
             return self._part(role, raw, name)
         if isinstance(role, Named):
@@ -264,20 +264,20 @@ class TableReader:
             self.problems += [problem.under(name) for problem in error.problems[:1]]
             return None
         if isinstance(role, Parameter):
-            self.questioned.setdefault(name, (raw, role.unit))
+            self.values_read.setdefault(name, (raw, role.unit))
         if ratio == 1.0 or value is None:
             return value
         return tuple(one / ratio for one in value) if isinstance(value, tuple) else value / ratio
 
     def in_file_unit(self, role: Parameter) -> Parameter:
-        """Parameter in the unit that this file uses for it."""
+        """Declaration of a parameter with the unit that this file uses for it."""
         if self.in_totals and self.area is None and is_per_area(role.unit):
             unit = "N m" if self.twisted else total_unit(role.unit)  # without area: forces
             return replace(role, unit=unit)
         return replace(role, unit=TURNING[role.unit]) if self.feed[1] and role.unit in TURNING else role
 
     def worded(self, role: Declared) -> Declared:
-        """Parameter as worded for people: totals where there is an area, and the words force or torque."""
+        """Declaration of a parameter for messages: as total if there is an area, with the word force or torque."""
         if not isinstance(role, Parameter):
             return role
         here = self.in_file_unit(role)
@@ -327,7 +327,7 @@ class TableReader:
 
 
 def _from_short(family: type[FrozenRecord], raw: Any) -> Table | None:
-    """Table that a short value stands for; None if there is none."""
+    """Table equivalent to a value in short form (law name, number or list); None if it is none."""
     if isinstance(raw, Mapping):
         return dict(raw)
     if has_choice(family):
@@ -349,7 +349,7 @@ def _missing(role: Declared) -> str:
 
 
 def _stand_in(law: type[FrozenRecord], valid: Mapping[str, Any], others: Mapping[str, Any]) -> FrozenRecord:
-    """Unchecked record with the valid values; `others` or defaults for the rest."""
+    """Record made without checks from `valid` values, for the rest `others` or defaults."""
     found = object.__new__(law)
     for item in fields(law):  # type: ignore[arg-type]
         default = None if is_required(item) else item.default
@@ -358,9 +358,9 @@ def _stand_in(law: type[FrozenRecord], valid: Mapping[str, Any], others: Mapping
 
 
 def _contradictions(law: type[FrozenRecord], valid: Mapping[str, Any], came_with: set[str]) -> list[Problem]:
-    """Contradictions between the valid fields of a record whose other fields are bad.
+    """Contradictions between the valid fields of a record whose other fields are invalid.
 
-    Bad or missing numbers are NaN, which violates no condition.
+    Invalid or missing numbers are set to NaN, which violates no condition.
     """
     bad = [i for i in fields(law) if i.name not in valid and (key_of(i) in came_with or is_required(i))]  # type: ignore[arg-type]
     if not all(isinstance(role_of(item), Parameter) for item in bad):
@@ -375,7 +375,7 @@ def _contradictions(law: type[FrozenRecord], valid: Mapping[str, Any], came_with
 
 
 def _key_of_another(law: type[FrozenRecord], name: str, value: Any) -> str:
-    """Hint for an unknown key: the laws of the family that have it, or the law that its value names."""
+    """Hint on an unknown key: other laws of the family that have it, or the law that its value names."""
     bases = (base for base in law.__mro__ if issubclass(base, FrozenRecord) and base is not FrozenRecord)
     family = next((base for base in bases if has_choice(base) and law in base.registry.values()), None)
     if family is None:
@@ -389,7 +389,7 @@ def _key_of_another(law: type[FrozenRecord], name: str, value: Any) -> str:
 
 
 def _tables_with(name: str, sections: Iterable[Section]) -> str:
-    """The tables of a file that have a key; empty if none has."""
+    """Text of the tables of a file that have a key; empty if none has."""
     found = [
         f"[{path}]"
         for path, laws in _nested_tables(sections)
@@ -399,7 +399,7 @@ def _tables_with(name: str, sections: Iterable[Section]) -> str:
 
 
 def _nested_tables(every: Iterable[Section]) -> Iterator[tuple[str, list[type[FrozenRecord]]]]:
-    """Yield the tables of a kind of file, ``contacts.NAME.friction``, with the records that may fill them."""
+    """Paths of all tables of a kind of file, such as ``contacts.NAME.friction``, each with its possible records."""
     left = [(f"{one.name}.NAME" if one.keyed else one.name, one.family) for one in every]
     for path, family in left:
         laws = list(family.registry.values()) if has_choice(family) else [family]
@@ -414,7 +414,7 @@ def _nested_tables(every: Iterable[Section]) -> Iterator[tuple[str, list[type[Fr
 
 
 def _part_of_another(family: type[FrozenRecord], name: object) -> str:
-    """Hint for an unknown law: the law of the family that has a part of this name."""
+    """Hint on an unknown law: a law of the family that has a part of this name."""
     for word, law in family.registry.items():
         for item, role in own_fields(law):
             if isinstance(role, Part) and role.inline and isinstance(name, str) and name in role.family.registry:

@@ -1,7 +1,7 @@
 """Template of a rig file: positions and units of its numbers, so that other values can be filled in.
 
-The parameter of each number is found by reading the file again with every number changed by a small share of its own;
-so every syntax that the reader understands is covered, and nothing about it is repeated here.
+The parameter of each number is found by reading the file again with each number changed by a different small share,
+so that all syntax of the reader is covered without being repeated here.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ _VALUE = re.compile(
 )
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*")
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
-_STEP = 1e-6  # relative change of the first number, others multiples: small, to stay valid, yet beyond rounding
-_ZERO_STEP = 1e-9  # change of a number that is 0, in its unit
+_STEP = 1e-6  # relative change of the first number, of others multiples: small to stay valid, yet above rounding
+_ZERO_STEP = 1e-9  # change of the first number that is 0, in its unit; of others multiples
 _SENTINEL = 1.2345678901e-211  # first of the placeholder values of omitted parameters; no rig has such numbers
 
 
 @dataclass(frozen=True)
 class Slot:
-    """Number in the text of a file, which another one can replace.
+    """Place of a number in the text of a file, which can be replaced.
 
     Attributes
     ----------
@@ -59,13 +59,13 @@ class Slot:
         return unit(self.unit)[0] if self.unit else 1.0
 
     def changed(self, number: float) -> str:
-        """TOML value of another number in the same unit."""
+        """TOML value of another number in the unit of this one."""
         return f'"{number!r} {self.unit}"' if self.unit else repr(number)
 
 
 @dataclass(frozen=True)
 class ParameterSource:
-    """Value of a parameter as a file has it.
+    """Value of a parameter as written in a file.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class ParameterSource:
     size : float
         Value of the unit in SI units.
     total : bool
-        True if the file gives the total of the area, by which it is divided.
+        True if the file gives the total over the area; the value is the total divided by the area.
     """
 
     text: str
@@ -95,14 +95,14 @@ class RigTemplate:
     Attributes
     ----------
     pieces : tuple of (str, str)
-        Text of the file in order; empty if values cannot be filled in so that the reader finds them (as where a file
-        omits a key of an inline table). Each is kind and content: for ``text`` the text itself, for ``value`` the name
-        of the parameter whose value stands there, for ``lines`` and ``table`` the name of the table whose omitted keys
-        belong there, in the latter case with its header.
+        Kind and content of consecutive pieces: ``text`` and the text itself; ``value`` and the name of the parameter
+        whose value belongs there; ``lines`` or ``table`` and the name of the table whose omitted keys belong there,
+        for ``table`` with a header. Empty if the reader would not find filled-in values (such as with omitted keys of
+        an inline table).
     sources : mapping of str to ParameterSource
-        Parameters that the file gives.
+        Sources of the parameters that the file gives.
     omitted : mapping of str to (str, str)
-        Table and key of parameters that the file omits.
+        Table and key of the parameters that the file omits.
     """
 
     pieces: tuple[tuple[str, str], ...]
@@ -114,7 +114,7 @@ class RigTemplate:
         return {name: key for name, (own, key) in self.omitted.items() if own == table}
 
     def filled(self, values: Mapping[str, str]) -> str:
-        """Text of the file with other values (TOML) for some parameters."""
+        """Text of the file with other values (TOML text) for some parameters."""
         text = ""
         for kind, words in self.pieces:
             if kind in ("lines", "table"):
@@ -133,14 +133,14 @@ def rig_template(text: str, rig: Slider | Machine, names: Sequence[str]) -> RigT
     text : str
         Text of the file.
     rig : Slider or Machine
-        The rig that was read from it; its values may differ.
+        Rig read from the file; its values may differ.
     names : sequence of str
         Dotted names of parameters.
 
     Returns
     -------
     RigTemplate or None
-        None if the text is not of such a rig.
+        None if the text is not a rig file, or has other parameters.
     """
     try:
         own = rig_from_text(text)
@@ -159,7 +159,7 @@ def rig_template(text: str, rig: Slider | Machine, names: Sequence[str]) -> RigT
 
 
 def _slots(text: str) -> list[Slot]:
-    """All numbers in the text that are values of a key, bare or quoted with a unit."""
+    """All numbers in the text that are values of keys, bare or quoted with a unit."""
     found = []
     for match in _VALUE.finditer(text):
         if match["value"] is None:
@@ -178,7 +178,7 @@ def _slots(text: str) -> list[Slot]:
 
 
 def _slots_by_name(text: str, rig: Slider | Machine, slots: list[Slot], names: Iterable[str]) -> dict[str, Slot]:
-    """Parameter of each number: the one that changes by the number's own share when all numbers are changed."""
+    """Slot of each parameter: the number whose share is that by which the parameter changes if all are changed."""
     other = _read(text, [(one, _changed_number(one, n)) for n, one in enumerate(slots)])
     if other is None:  # a changed number is invalid: keep those that may be changed
         kept = [n for n, one in enumerate(slots) if _read(text, [(one, _changed_number(one, n))]) is not None]
@@ -217,7 +217,7 @@ def _read(text: str, changes: list[tuple[Slot, float]]) -> Slider | Machine | No
     for slot, number in sorted(changes, key=lambda item: -item[0].start):
         text = text[: slot.start] + slot.changed(number) + text[slot.end :]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnitWarning)  # what was put in is no one's
+        warnings.simplefilter("ignore", UnitWarning)  # changed numbers need no warnings
         try:
             return rig_from_text(text)
         except (ParameterError, OverflowError):
@@ -233,7 +233,7 @@ def _source_of(text: str, rig: Slider | Machine, address: Address, slot: Slot) -
 
 
 def _omitted(rig: Slider | Machine, names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Table and key of each parameter that the file omits, found by writing the rig with placeholder values."""
+    """Table and key of each parameter in `names`, found by writing the rig with placeholder values."""
     marks = {name: _SENTINEL * (1 + i) for i, name in enumerate(names)}
     found: dict[str, tuple[str, str]] = {}
     if not names:
@@ -253,7 +253,7 @@ def _omitted(rig: Slider | Machine, names: Sequence[str]) -> dict[str, tuple[str
 
 
 def _numbered(heading: re.Match[str], counts: dict[str, int]) -> tuple[str, dict[str, int]]:
-    """Name of a table from its header; members of lists are numbered from 1."""
+    """Name of a table from its header, with members of lists numbered from 1; and the updated counts."""
     name = heading[2].replace('"', "").replace("'", "")
     if heading[1] == "[[":
         counts[name] = counts.get(name, 0) + 1
@@ -262,7 +262,7 @@ def _numbered(heading: re.Match[str], counts: dict[str, int]) -> tuple[str, dict
 
 
 def _pieces(text: str, found: Mapping[str, Slot], tables: set[str]) -> tuple[tuple[str, str], ...]:
-    """Pieces of a template: text, values, and places for omitted keys behind their table, or at the end."""
+    """Pieces of a template: text, values, and places for omitted keys after their table or at the end."""
     text += "" if text.endswith("\n") else "\n"
     marks = [(one.start, one.end, "value", name) for name, one in found.items()]
     at, table, ends = 0, "", dict[str, int]()
@@ -283,7 +283,7 @@ def _pieces(text: str, found: Mapping[str, Slot], tables: set[str]) -> tuple[tup
 
 
 def _is_read_back(found: RigTemplate, rig: Slider | Machine, names: Sequence[str]) -> bool:
-    """True if the filled template is read as the same rig with the filled values, and unfilled as itself."""
+    """True if the template without values is read as `rig`, and with values as the rig with these values."""
     if set(names) - set(found.sources) - set(found.omitted):
         return False
     addresses = rig.parameters()
@@ -304,7 +304,7 @@ def _is_read_back(found: RigTemplate, rig: Slider | Machine, names: Sequence[str
 
 
 def toml_in_si(address: Address, value: float) -> str:
-    """Value as TOML in SI units, per unit area."""
+    """TOML text of a value in SI units, per unit area."""
     if address.role.domain.whole:
         return f"{value:.0f}"
     return repr(float(value)) if address.role.unit == "1" else f'"{float(value)!r} {address.role.unit}"'

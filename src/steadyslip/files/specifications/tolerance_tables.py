@@ -1,7 +1,7 @@
 """Tolerances, correlations and adjustable parameters of a rig file.
 
-A number of a rig's tables may be a text with a tolerance, ``stiffness = "12 ± 20 % N/um"``; what reads the rig takes
-the value, `read_tolerances` the rest.
+A value of a rig's tables may be a text with a tolerance, ``stiffness = "12 ± 20 % N/um"``; reading a rig takes the
+value only, `read_tolerances` the tolerance.
 """
 
 from __future__ import annotations
@@ -30,14 +30,15 @@ _KEYS = ("from", "to", "cost")
 
 @dataclass(frozen=True)
 class Adjustment(Displayed):
-    """What may be changed about a rig.
+    """Allowed change of one parameter of a rig.
 
     Attributes
     ----------
     low, high : float or None
-        Limits, SI units; None for those of the search.
+        Limits of the value, SI units; None for those of the search.
     cost : float or None
-        Of doubling or halving the value; other changes in proportion to their logarithm. None for 1, of the speed 4.
+        Cost of doubling or halving the value; other changes in proportion to their logarithm. None for the default, see
+        `steadyslip.verdict.change_costs`.
     """
 
     low: float | None = None
@@ -47,16 +48,16 @@ class Adjustment(Displayed):
 
 @dataclass(frozen=True)
 class Tolerances(Displayed):
-    """Tolerances of a rig file: deviations, correlations, and what may be adjusted.
+    """Tolerances of a rig file: deviations, correlations, adjustable and unknown parameters.
 
     Attributes
     ----------
     values : dict of str to Tolerance
-        By dotted name.
+        Tolerances by dotted name.
     correlations : tuple of (str, str, float)
-        Coefficients of correlation of two parameters each.
+        Two parameters and their coefficient of correlation.
     adjust : dict of str to Adjustment
-        Empty without a table ``[adjust]``.
+        Parameters that may be changed; empty without a table ``[adjust]``.
     unknown : dict of str to (float, float)
         Intervals of the table ``[unknown]``, SI units.
     """
@@ -85,7 +86,7 @@ def read_tolerances(path: str | PathLike[str], changes: Iterable[str] = ()) -> T
     Returns
     -------
     Tolerances
-        Empty where the file has none.
+        Empty if the file has none.
 
     Raises
     ------
@@ -106,7 +107,7 @@ def rig_and_tolerances(path: str | PathLike[str], changes: Iterable[str] = ()) -
     changes = list(changes)
     contents = read_whole(path, changes)
     rig = contents.rig
-    if rig is None:  # a faulty or absent rig
+    if rig is None:  # invalid or absent
         contents.refuse()
         return contents.checked_rig(), Tolerances()
     reader = _Reader(rig, contents.tables)
@@ -116,7 +117,7 @@ def rig_and_tolerances(path: str | PathLike[str], changes: Iterable[str] = ()) -
 
 
 class _Reader:
-    """Reader of the tables of tolerances of one rig; collects problems."""
+    """Reader of the tables on tolerances for one rig; collects problems."""
 
     def __init__(self, rig: Slider | Machine, tables: Table) -> None:
         self.rig, self.tables = rig, tables
@@ -168,7 +169,7 @@ class _Reader:
         for path, raw in self._table("adjust"):
             where = f"adjust.{path}"
             owner, _, key = path.rpartition(".")
-            if not isinstance(raw, dict) and self._known(owner):  # a table without any of the keys
+            if not isinstance(raw, dict) and self._known(owner):  # a misspelt key makes the table look like a parameter
                 self._problem(where, unknown_name("key", key, _KEYS))
                 continue
             if not (name := self._name(path, where)):
@@ -214,7 +215,7 @@ class _Reader:
         return False
 
     def _name(self, given: str, where: str) -> str:
-        """Full name of a parameter that the rig has; empty after noting a problem."""
+        """Full name of a parameter in the rig's equations; empty after reporting a problem."""
         known = {name: one for name, one in self.rig.parameters().items() if one.value is not None}
         try:
             name = self.rig.resolve(given)

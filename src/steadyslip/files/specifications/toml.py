@@ -1,6 +1,6 @@
-"""Parsing of TOML text within bounds, against input that would keep the parser busy for ever or overflow later.
+"""Parsing of TOML text within bounds, since crafted input could take the parser hours or overflow later.
 
-Also the lines on which keys stand, for messages.
+Also finds the line numbers of keys, for messages.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from typing import Any
 
 Table = dict[str, Any]
 MOST_PARTS = 32
-"""Most parts of a dotted key; the time that tomllib takes grows with their cube."""
+"""Most parts of a dotted key; the time of tomllib grows with their cube."""
 MOST_INTEGER = 2**63
-"""Bound of integers: TOML's have 64 bits."""
+"""Bound of integers, which have 64 bits in TOML."""
 
 _PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 _LONG_KEY = re.compile(rf"(?<![\w\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS}}}")
 
 _COMMA = re.compile(r"^[^#\"'\n=]+=[ \t]*+([-+]?\d++),(\d++)[ \t]*+(?:#.*)?$", re.MULTILINE)
-"""A line that gives one number with a decimal comma, with its digits before and behind."""
+"""A line with one number with a decimal comma; groups are the digits before and after it."""
 
 _SLIPS = (
     (re.compile(r"\s*(?://|;|--|%)"), "a comment begins with #"),
@@ -32,7 +32,7 @@ _SLIPS = (
     (re.compile(r"[^\"'#]*=\s*[^\W\d_]"), "a word stands in quotes, as in law = 'lugre'"),
     (re.compile(r"[^\"#]*\"[^\"]*$|[^'#]*'[^']*$"), "a text ends on its line with the quote with which it begins"),
 )
-"""Lines that are often written for TOML, and what to write instead; the first that fits is told."""
+"""Patterns of common mistakes in TOML lines, and advice; that of the first match is given."""
 _PLACE = re.compile(r" \(at line (\d+), column \d+\)$")
 _TWICE = re.compile(r"Cannot declare \((.*?),?\) twice")
 
@@ -57,7 +57,7 @@ def tables_of(text: str) -> Table:
         tables = tomllib.loads(text)
     except RecursionError:
         raise NotToml("lists or tables lie too deep in each other") from None
-    except ValueError as error:  # Python's own error for integers of thousands of digits is no TOMLDecodeError
+    except ValueError as error:  # integers of thousands of digits raise no TOMLDecodeError
         why = str(error) if isinstance(error, tomllib.TOMLDecodeError) else _TOO_LARGE
         comma = _COMMA.search(text)
         hint = f"; {comma[1]},{comma[2]} has a decimal comma: write {comma[1]}.{comma[2]}" if comma else ""
@@ -67,7 +67,7 @@ def tables_of(text: str) -> Table:
 
 
 def _explained(why: str, text: str) -> str:
-    """The reason of the parser with the line that it stopped at, and what to write instead."""
+    """Message of the parser with the line at which it stopped, and advice if the mistake is a common one."""
     place, lines = _PLACE.search(why), text.splitlines()
     if place is None or not 0 < int(place[1]) <= len(lines):
         return why
@@ -80,7 +80,7 @@ def _explained(why: str, text: str) -> str:
 
 
 def _check(tables: Any) -> None:
-    """Raise an error for integers beyond 64 bits; iterative, because the file determines the depth."""
+    """Raise NotToml for integers beyond 64 bits; without recursion, since the file determines the depth."""
     left = [tables]
     while left:
         value = left.pop()
@@ -96,7 +96,7 @@ _KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za
 
 
 def key_lines(text: str) -> dict[str, int]:
-    """Line (from 1) of every table header and key, by dotted name; members of lists are numbered from 1."""
+    """Line number (from 1) of every table header and key by dotted name; members of lists are numbered from 1."""
     lines: dict[str, int] = {}
     counts: dict[str, int] = {}
     prefix = ""
@@ -115,7 +115,7 @@ def key_lines(text: str) -> dict[str, int]:
 
 
 def line_of(name: str, lines: dict[str, int]) -> int | None:
-    """Line of a key, of the first in a table that has no line, or of the nearest table around it; else None."""
+    """Line number of a key; for a table without line that of its first key, else of the table around it; else None."""
     inside = [line for key, line in lines.items() if key.startswith(f"{name}.")]
     if name not in lines and inside:
         return min(inside)
@@ -127,7 +127,7 @@ def line_of(name: str, lines: dict[str, int]) -> int | None:
 
 
 def _header(line: str) -> tuple[str, bool] | None:
-    """Dotted name of a table's header, and True if it begins a member of a list; None for other lines."""
+    """Dotted name in a table header, and True if it begins a member of a list; None for other lines."""
     text = line.strip()
     listed = text.startswith("[[")
     opened, closed = ("[[", "]]") if listed else ("[", "]")

@@ -1,9 +1,9 @@
-"""Intervals of parameters that nothing measured tells yet: the table [unknown] of a rig file.
+"""Intervals of parameters that have not been measured: the table [unknown] of a rig file.
 
     [unknown]
     friction.bristle_stiffness = ["20 N/um at 3.2 kN", "2000 N/um at 3.2 kN"]
 
-What reads the rig takes the value that the rig's own tables have; the interval is for what answers over it.
+Reading the rig takes the value from the rig's own tables; the interval is for verdicts over all its values.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def read_unknowns(
     ----------
     path : path
     changes : iterable of str
-        As for `read_rig`; what is given there is known.
+        As for `read_rig`; a parameter that is changed counts as known.
 
     Returns
     -------
@@ -53,7 +53,9 @@ def read_unknowns(
 def intervals_of(
     rig: Slider | Machine, path: str | PathLike[str], changes: Iterable[str]
 ) -> dict[str, tuple[float, float]]:
-    """Intervals of the table [unknown] of the file of a rig, without those of values that changes give."""
+    """Intervals of the table [unknown] of a rig's file, without parameters that are changed: (low, high) by dotted
+    name, SI units.
+    """
     text = text_of(path)
     table, lines = tables_of(text).get(UNKNOWN, {}), key_lines(text)
     known = rig.parameters()
@@ -78,6 +80,6 @@ def intervals_of(
         raise RigFileError(problems, title=str(path))
     told = set()
     for name, _ in map(named_value, changes):
-        with suppress(SteadyslipError):  # of another table
+        with suppress(SteadyslipError):  # a change of another table
             told.add(rig.resolve(name))
     return {name: ends for name, ends in found.items() if name not in told}

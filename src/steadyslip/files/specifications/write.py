@@ -106,7 +106,7 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
 
 
 def stored_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
-    """Text of `rig_to_text` for stored results, with the units in which the rig and its parameters are told."""
+    """Text of `rig_to_text` for stored results, with a first line on the units in which the rig is printed."""
     units = "; ".join([*sorted(rig.written_in), *(f"{name} = {one}" for name, one in rig.units_named.items())])
     return f"{TOLD_IN}{units}\n{rig_to_text(rig, protocol)}"
 
@@ -122,10 +122,10 @@ def table_text(
     header: str, record: FrozenRecord, first: list[str], path: str, area: float | None,
     own: Mapping[str, Address] | None = None,
 ) -> str:  # fmt: skip
-    """TOML text of a record; `own` are parameters in the units that they have in this rig."""
+    """TOML text of a record; `own` are parameters by dotted name with the units that they have in this rig."""
     lines = [header, *first]
     if record.in_totals:
-        area = getattr(record, "area", None) or 1.0  # without one, in forces
+        area = getattr(record, "area", None) or 1.0  # without an area in forces
     below: list[str] = []
     for item, role in own_fields(type(record)):
         value, key = getattr(record, item.name), key_of(item)
@@ -153,7 +153,7 @@ def table_text(
 
 
 def _members(family: type[FrozenRecord], members: Mapping[str, FrozenRecord], path: str) -> str:
-    """TOML text of a table for each member, by name."""
+    """TOML text of members by name, a table each."""
     blocks = []
     for name, one in members.items():
         first = []
@@ -166,7 +166,7 @@ def _members(family: type[FrozenRecord], members: Mapping[str, FrozenRecord], pa
 
 
 def _named(role: Named, values: Mapping[str, Any], path: str) -> str:
-    """TOML text of values by dotted name: an inline table or a list each."""
+    """TOML text of values by dotted name, each as an inline table or a list."""
     lines = [f"[{path}]"]
     for name, one in values.items():
         if isinstance(one, role.family):
@@ -179,6 +179,6 @@ def _named(role: Named, values: Mapping[str, Any], path: str) -> str:
 
 
 def _member(family: type[FrozenRecord], member: FrozenRecord, name: str, path: str, area: float | None) -> str:
-    """TOML text of one table of a list."""
+    """TOML text of one member of a list of tables."""
     first = [f'{selector(family)[0]} = "{_law_name(member, name)}"'] if has_choice(family) else []
     return table_text(f"[[{name}]]", member, first, path, area)

@@ -146,7 +146,7 @@ def test_refusals():
     with pytest.raises(ss.NotAvailable, match="a push or creep has no verdict of its own"):
         ss.frozen_verdicts(press(), ss.protocol.DisturbanceStep(at=1, by=1.0), until=2)
     spring = ss.laws.InclinedSpring(steady_normal_stress=5e6, angle=0.1)
-    with pytest.raises(ss.NotAvailable, match="contact counts its normal stress from the steady sliding at the start"):
+    with pytest.raises(ss.NotAvailable, match="contact refers its normal stress to the steady sliding at the start"):
         ss.frozen_verdicts(press(spring), ss.protocol.VelocityStep(at=1, to=2e-5), until=2)
     guide = ss.laws.SlopedGuide(preload=5e6, guide_stiffness=1e9, slope=-0.1)
     with pytest.raises(ss.NotAvailable, match="none that depends on displacement"):

@@ -1,6 +1,6 @@
 """Pseudo-arclength continuation: follow the curve of solutions of n equations in n + 1 unknowns.
 
-Nothing here knows what the equations mean. Unknowns are expected to be of order one (the caller scales them).
+Independent of the meaning of the equations. Unknowns are expected to be of order one (the caller scales them).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 from steadyslip.core.arrays import Array
 
 Equations = Callable[[Array], tuple[Array, Array]]
-"""u (n+1,) to residuals (n,) and their Jacobian (n, n+1). May raise `Failure`."""
-MOST_ITERATIONS = 10  # of Newton's method for one point
-ASIDE = 10.0  # factor of `reach` by which intermediate Newton iterates may be farther away
-NEARLY = 1e-5  # Newton step below which one larger step may follow
-CHORDS = 8  # iterations with an earlier Jacobian: where more are needed, a new one is worth its time
+"""Function of u (n+1,): residuals (n,) and their Jacobian (n, n+1). May raise `Failure`."""
+MOST_ITERATIONS = 10  # limit of Newton iterations for one point
+ASIDE = 10.0  # factor on `reach` within which intermediate Newton iterates must stay
+NEARLY = 1e-5  # relative Newton step below which an increase of the next one is not divergence
+CHORDS = 8  # limit of iterations with an earlier Jacobian: where more are needed, a new one costs less time
 GROW, FASTER, SHRINK = (
     1.4,
     2.0,
@@ -33,9 +33,10 @@ class Failure(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A solution on the curve, the unit tangent there, and the length of curve since the start.
+    """A solution on the curve, the unit tangent there, and the arclength from the start.
 
-    `rounding` is how much the last unknown, the parameter, is blurred by rounding in the equations, where that shows.
+    `rounding` is the error of the last unknown, the parameter, by rounding in the equations; 0 where Newton's method
+    converged to its tolerance.
     """
 
     u: Array
@@ -54,18 +55,18 @@ class SolutionCurve:
     tolerance : float
         Size of the last Newton step that counts as converged, relative to unknowns that exceed one.
     most_turn : float
-        Largest angle (cosine) between tangents of neighbouring points.
+        Cosine of the largest angle between tangents of neighbouring points.
     weights : ndarray (n+1,), optional
-        Of the unknowns' squares in lengths and angles; one unless given.
+        Weights of the squared unknowns in lengths and angles; 1 by default.
     rounding : float, optional
-        Size of Newton steps that counts as converged where they no longer shrink: rounding in the equations.
+        Newton steps below this size count as converged once they no longer shrink: rounding in the equations.
     residuals : callable, optional
-        The residuals alone, where they take far less time than with their Jacobian: points are then approached with the
-        Jacobian of the one before.
+        Function of u for the residuals (n,) alone, if that takes far less time than with their Jacobian: iterations
+        then begin with the Jacobian of the point before.
     jacobian : ndarray (n, n+1), optional
-        At a point near by.
+        Jacobian at a nearby point, to begin with.
     improved : callable, optional
-        Takes the prediction of a point, and how far it may be moved, and returns a better one.
+        Function of the predicted point (n+1,) and the distance that it may be moved; returns a better prediction.
     """
 
     def __init__(
@@ -77,23 +78,23 @@ class SolutionCurve:
         self.rounding, self.residuals, self.jacobian, self.improved = rounding, residuals, jacobian, improved
         self.weights: Any = 1.0 if weights is None else weights
         self.bend = float(np.sqrt((1 - most_turn) / (1 + most_turn)))
-        """tan of half the largest turn: how far an arc that turns by so much leaves its tangent, per length."""
+        """tan of half the largest angle: distance of an arc that turns by it from its tangent, per length."""
 
     def size(self, u: Array) -> float:
-        """Length of a difference of unknowns."""
+        """Weighted length of a difference of unknowns (n+1,)."""
         return float(np.sqrt(np.sum(self.weights * u * u)))
 
     def start(self, guess: Array, tangent: Array) -> Point:
-        """Solve for the point nearest to a guess, in the plane across `tangent`; its tangent points that way."""
+        """Solution in the plane through `guess` normal to `tangent`, with its own tangent oriented as that."""
         return self.corrected(guess, tangent, 0.0)
 
     def corrected(self, guess: Array, tangent: Array, length: float, reach: float = np.inf) -> Point:
-        """Solve by Newton's method in the plane through `guess` across `tangent`.
+        """Solution, by Newton's method, in the plane through `guess` normal to `tangent`; `length` is its arclength.
 
         Raises
         ------
         Failure
-            If it does not converge, or only farther than `reach` from the guess: on something else.
+            If it does not converge within `reach` of the guess: beyond, it would be on another curve.
         """
         across = self.weights * tangent
         u, before = guess.copy(), np.inf
@@ -112,9 +113,9 @@ class SolutionCurve:
                 raise Failure("not finite")
             u = u - step
             size = float(np.max(np.abs(step) / np.maximum(1.0, np.abs(u))))
-            standing = size > 0.3 * before
-            rounded = standing and iteration > 2 and size <= self.rounding
-            converged = size <= self.tolerance or (size < 10 * self.tolerance and standing) or rounded
+            stagnant = size > 0.3 * before
+            rounded = stagnant and iteration > 2 and size <= self.rounding
+            converged = size <= self.tolerance or (size < 10 * self.tolerance and stagnant) or rounded
             if self.size(u - guess) > (reach if converged else ASIDE * reach):
                 raise Failure("the equations lead elsewhere")
             if converged:
@@ -129,9 +130,9 @@ class SolutionCurve:
         raise Failure("no convergence")
 
     def _approached(self, start: Array, moved: float, guess: Array, across: Array, reach: float) -> tuple[Array, float]:
-        """Near the solution, from residuals and the last Jacobian, kept up by Broyden's rule; and the last step's size.
+        """Approximate solution by Broyden's method from the last Jacobian, and the size of its last step.
 
-        `start` itself, and the step `moved` that led there, where that does not converge.
+        Returns `start`, and the size `moved` of the step that led to it, if that does not converge.
         """
         if self.residuals is None or self.jacobian is None:
             return start, moved
@@ -159,20 +160,21 @@ class SolutionCurve:
     ) -> Iterator[Point]:
         """Yield points along the curve from `first`, which is not among them.
 
-        A point is taken for the continuation of the one before only if it is as close to the tangent there as an arc
-        would be that turns no more than is allowed, and does turn no more. It is looked for on the parabola that the
-        last two tangents make: where equations are strongly bent, steps along the tangent alone would stay tiny. Steps
-        grow up to `most`, or to a fifth of the largest unknown where that is more.
+        A point continues the curve only if its tangent turns by no more than `most_turn` from that of the point before,
+        and if it lies no farther from that tangent than an arc with this turn. It is predicted on the parabola through
+        the last two tangents: with strong curvature, steps along the tangent alone would stay tiny.
 
         Parameters
         ----------
+        step, least, most : float
+            First, smallest and largest step of arclength; a fifth of the largest unknown is allowed where that is more.
         accept : callable, optional
-            Raises `Failure` for points that are refused for other reasons.
+            Function of a point that raises `Failure` to refuse it for other reasons.
 
         Raises
         ------
         Failure
-            Where steps of `least` no longer succeed.
+            If a step would have to be smaller than `least`.
         """
         here, curvature = first, np.zeros(len(first.u))
         while True:
@@ -212,11 +214,11 @@ class SolutionCurve:
         Failure
             If a point between the two cannot be found.
         """
-        a, b, side = 0.0, float((self.weights * low.tangent) @ (high.u - low.u)), 0  # as planes across are apart
+        a, b, side = 0.0, float((self.weights * low.tangent) @ (high.u - low.u)), 0  # distance between the planes
         near, far = low, high
         reach = 2 * self.bend * abs(b) + 100 * self.tolerance
         for _ in range(60):
-            rise = at_high - at_low  # zero where the measure is rounding on both sides
+            rise = at_high - at_low  # 0 where `measure` is rounding at both ends
             s = b - at_high * (b - a) / rise if rise else a
             if not a < s < b:
                 s = 0.5 * (a + b)
@@ -235,7 +237,7 @@ class SolutionCurve:
         return (near, far) if side == -1 else (far, near)
 
     def _between(self, low: Point, near: Point, far: Point, s: float) -> Array:
-        """Predict the point at distance `s` along the tangent of `low`, on the cubic through two points."""
+        """Predicted unknowns (n+1,) at distance `s` along the tangent of `low`, on a cubic through two points."""
         across = self.weights * low.tangent
         a, b = (float(across @ (one.u - low.u)) for one in (near, far))
         share, chord = (s - a) / (b - a), far.u - near.u
@@ -247,5 +249,5 @@ class SolutionCurve:
 
 
 def turned_round(point: Point) -> Point:
-    """Reverse a point: tangent and arclength change sign."""
+    """Copy of a point with reversed tangent and arclength, to follow the curve the other way."""
     return replace(point, tangent=-point.tangent, length=-point.length)

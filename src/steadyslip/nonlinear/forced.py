@@ -27,10 +27,10 @@ from steadyslip.protocol.pieces import Harmonic
 
 
 class SwingingInput(NamedTuple):
-    """Names of a kind of input in the models of sliders and machines, and the piece of a protocol that swings it."""
+    """Names of one kind of input in the Models of sliders and machines, and the protocol piece that oscillates it."""
 
-    slider: str  # empty: as of a machine, of the contact without a name
-    machine: str  # behind the name of a body or contact; of the drive whole
+    slider: str  # empty if the name in a slider is `machine`, after the empty name of its contact
+    machine: str  # ending, after the name of a body or contact; the whole name for the drive
     piece: type[Harmonic]
 
 
@@ -41,23 +41,23 @@ INPUTS = {
     "injection": SwingingInput("", ".pores", InjectionHarmonic),
 }
 SAMPLES = 256  # per period: harmonics up to the 127th are resolved
-LEAST_PERIODS, MOST_PERIODS = 10, 2560  # waited for; twice as many each time
-SETTLED = 1e-7  # difference of two periods, in ranges of the output, below which they are equal
-FAINT = 1e-5  # that difference for outputs as small as integration errors, and after the most periods
-ROUGHLY = 1e-4  # that difference for limits, which are found to a twentieth
+LEAST_PERIODS, MOST_PERIODS = 10, 2560  # simulated until motion repeats; doubled from the first to the second
+SETTLED = 1e-7  # difference of two periods, over the output's range, below which the motion is periodic
+FAINT = 1e-5  # as SETTLED, where integration errors hide smaller differences, and after MOST_PERIODS
+ROUGHLY = 1e-4  # as SETTLED, for limits of amplitude, which are found to 5 %
 DEPARTED = 0.05  # relative deviation from the small-amplitude gain at which the gain counts as nonlinear
-MOST_FADED = 700.0  # e-folds within the range of floating point
-IRREGULARLY = 1e-2  # difference of periods, in ranges, above which lasting differences count as irregular motion
-TIGHTER, TIGHTEST = 100, 1e-12  # share and least of the tolerance, where errors of the integration hide the answer
-MOST_SHARE = 0.99  # largest amplitude tried for limits, in steady values: just below a change of sign
-DECADES = 3  # of amplitude searched below that, and once more where needed
+MOST_FADED = 700.0  # largest exponent of e within the range of floating point
+IRREGULARLY = 1e-2  # difference of periods, over the output's range, above which motion counts as irregular
+TIGHTER, TIGHTEST = 100, 1e-12  # factor by which rtol is reduced where integration errors dominate, and its least value
+MOST_SHARE = 0.99  # largest amplitude tried for limits, over the input's steady value: just below a change of sign
+DECADES = 3  # decades of amplitude searched below MOST_SHARE, and as many again where needed
 STEPS = 12  # amplitudes tried upwards over that range, each 1.8 times the one before: a narrower window may be missed
 HALVINGS = 4  # bisections of the logarithm of amplitude within such a step: limits are right to 4 %
 RISING = Measured(
     "numbers > 0 that rise", lambda given: _positive(given) and bool(np.all(np.diff(np.ravel(given)) > 0)), "s"
 )
 SIZES = Tested("numbers > 0, in SI units", lambda given: np.size(given) == 0 or _positive(given))
-COMPARED = 5  # last periods that are compared: repetition up to every 4th is found
+COMPARED = 5  # number of last periods that are compared: repetition up to every 4th is found
 
 
 @checked(periods=RISING, amplitudes=SIZES, input=NAME, output=NAME, on=NAME, limits=FLAG)
@@ -73,31 +73,30 @@ def response(
     rtol: float = 1e-9,
     progress: bool | None = None,
 ) -> FrequencyResponse:
-    """Response of steady sliding to an input that oscillates sinusoidally for ever.
+    """Response of steady sliding to a sinusoidal input: gain and phase at each period, and limits of amplitude.
 
     Parameters
     ----------
     rig : Slider or Machine
     periods : array_like
-        s, rising.
+        Periods of the input, s, rising.
     input : str, optional
-        What swings: ``normal-stress`` (added to that of the contact), ``drive-velocity``, ``push`` (a stress on the
-        block, or force on a body) or ``injection`` (pressure of the fluid around a contact).
+        Oscillating input: ``normal-stress`` (added to that of the contact), ``drive-velocity``, ``push`` (a stress on
+        the block, or force on a body) or ``injection`` (pressure of the fluid around a contact).
     output : str, optional
-        What answers: an observable of the Model, ``friction``, ``shear-stress`` (or ``shear_stress``), ``v``, ...; of a
-        machine with the name of its contact or body, ``guide.friction``. Unless given friction, of the first contact.
+        Observable of the Model: ``friction``, ``shear-stress`` (or ``shear_stress``), ``v``, ...; of a machine with the
+        name of its contact or body, ``guide.friction``. By default friction, at the first contact.
     on : str, optional
-        Of a machine: the contact that is pressed or injected at, or the body that is pushed; needed where there are
-        several.
+        Contact or body of a machine on which the input acts; needed where there are several.
     amplitudes : array_like, optional
         Amplitudes of the input (SI) at which motion is simulated until it repeats.
     limits : bool, optional
-        Whether to look, at every period, for the amplitudes up to which the gain is linear to within 5 % and from which
+        True to search, at every period, for the amplitudes up to which the gain is linear to within 5 % and from which
         steady sliding is lost.
     rtol : float, optional
         Relative tolerance of the simulations.
     progress : bool, optional
-        Whether to show progress; on a terminal unless given.
+        True to show progress; by default on a terminal only.
 
     Returns
     -------
@@ -108,19 +107,19 @@ def response(
     UnknownNameError
         If there is no such input or output.
     ParameterError
-        If it is open what swings, or a number is wrong.
+        If `on` is needed and missing, or a number is not allowed.
     NoSteadySliding
-        If there is nothing to swing about.
+        If there is no steady sliding about which the input could oscillate.
     NotAvailable
         If numbers leave the range of floating point.
 
     Notes
     -----
     Small amplitudes: G(iω) = C(iω − A)⁻¹B + D of `state_space`, exact; with delays late forces are turned by e^(−iωτ)
-    instead. Large ones: the motion is run for 10 periods, or as long as transients of small amplitude last, and for
-    twice as long until two periods agree to 1e-7 of their range and so does what is still to come of a transient; the
-    last one is taken apart by a discrete Fourier transform. After 2560 periods, and where errors of the integration
-    are not less even with a smaller tolerance, 1e-5 will do.
+    instead. Large ones: the motion is simulated for 10 periods, or as long as transients of small amplitude last, and
+    again for twice as long, until two periods agree to 1e-7 of their range and the rest of a transient is as small;
+    gain and phase follow from a discrete Fourier transform of the last period. After 2560 periods, and where
+    integration errors are larger even with a smaller tolerance, 1e-5 suffices.
 
     Examples
     --------
@@ -143,7 +142,7 @@ def response(
     with progress_bar(total, progress if total else False, "answers") as step:
         for i, period in enumerate(periods):
             for j, amplitude in enumerate(amplitudes):
-                status[j, i], numbers[:, j, i] = forced.swung(amplitude, period)
+                status[j, i], numbers[:, j, i] = forced.final_motion(amplitude, period)
                 if step:
                     step(1)
             if limits:
@@ -167,13 +166,13 @@ def _positive(given: Any) -> bool:
 
 
 def spelled(output: str) -> str:
-    """Name of an observable as users type it: with hyphens, but for the name of a body or contact before it."""
+    """Name of an observable with hyphens for underscores, but for the name of a body or contact before the dot."""
     owner, dot, own = output.rpartition(".")
     return owner + dot + own.replace("_", "-")
 
 
 def amplitude_unit(rig: Slider | Machine, input: str = "normal-stress", on: str | None = None) -> str:
-    """SI unit of an amplitude: that of the input on this rig."""
+    """SI unit of the amplitude of an input of this rig."""
     return _Forced(rig, input, on, None, 1e-9).units[0]
 
 
@@ -194,7 +193,7 @@ class _Forced:
         late = np.ravel(delays_of(operating_point(rig)))
         shortest = float(
             min((1.0, *late[late > 0]))
-        )  # s: only the start is asked for, and short delays make small steps
+        )  # s: only the state at time 0 is needed, and short delays make small steps
         start = simulate(rig, until=shortest, times=[0.0], events=False)
         self.steady = {name: float(start[name][0]) for name in model.observables}
         self.decay = float(growth_rate(rig))
@@ -229,8 +228,8 @@ class _Forced:
         on: dict[str, Any] = {} if self.on is None else {"on": self.on}
         return INPUTS[self.kind].piece(amplitude=amplitude, period=period, **on)
 
-    def swung(self, amplitude: float, period: float, settled: float = SETTLED) -> tuple[str, tuple[float, ...]]:
-        """Simulate to the final motion: its description, and the numbers named in `_NUMBERS` (NaN if it has none)."""
+    def final_motion(self, amplitude: float, period: float, settled: float = SETTLED) -> tuple[str, tuple[float, ...]]:
+        """Status of the motion after transients, and its quantities named in `_NUMBERS` (NaN unless periodic)."""
         waited = math.log(settled) / self.decay / period if self.decay < 0 else 0.0
         count = int(min(max(LEAST_PERIODS, math.ceil(waited)), MOST_PERIODS))
         nothing, before = (math.nan,) * len(_NUMBERS), math.inf
@@ -256,11 +255,11 @@ class _Forced:
                 return _unsettled(apart), nothing
 
     def _to_come(self, time: float) -> float:
-        """Remaining size of a transient relative to its decay during the last `time` seconds."""
+        """Size of a transient now, relative to its decrease during the last `time` seconds."""
         return 1 / float(np.expm1(min(-self.decay * time, MOST_FADED))) if self.decay < 0 else 0.0
 
     def _run(self, amplitude: float, period: float, count: int, rtol: float) -> tuple[dict[str, Array], str]:
-        """Observables over the period before the middle of `count` and over the last `COMPARED`; status of the run."""
+        """Observables over the period before the middle of the run and over the last `COMPARED` periods; its status."""
         first = np.array([count // 2 - 1, *range(count - COMPARED, count)])
         times = period * (first[:, None] + np.arange(SAMPLES) / SAMPLES).ravel()
         run = simulate(
@@ -271,6 +270,7 @@ class _Forced:
         return {name: np.asarray(run[name]) for name in self.steady}, run.status
 
     def _numbers(self, columns: dict[str, Array], last: Array, amplitude: float) -> tuple[float, ...]:
+        """Quantities named in `_NUMBERS`, from the observables and the output over the last period."""
         parts = np.fft.rfft(last) / (SAMPLES / 2)
         first = 1j * parts[1] / amplitude  # the input is a sine, which is -i e^(iωt)
         higher = math.sqrt(float(np.sum(np.abs(parts[2:]) ** 2))) / abs(parts[1]) if parts[1] else math.nan
@@ -279,7 +279,7 @@ class _Forced:
         return abs(first), float(np.degrees(np.angle(first))), shift, friction, higher
 
     def friction(self, means: Mapping[str, float]) -> float:
-        """Mean friction over mean normal stress (or force) where the output is; NaN if that is no contact."""
+        """Mean friction over mean normal stress (or force) at the output's contact; NaN if the output has none."""
         own = self.output.rpartition(".")[0] + "." if "." in self.output else ""
         for shear, normal in (("shear_stress", "normal_stress"), ("friction_force", "normal_force")):
             if own + shear in means:
@@ -287,7 +287,7 @@ class _Forced:
         return math.nan
 
     def limits(self, period: float, gain: float) -> tuple[float, float]:
-        """Amplitudes up to which the gain is linear, and from which steady sliding is lost."""
+        """Amplitudes (SI units) up to which the gain is linear, and from which steady sliding is lost."""
         if self.decay >= 0:
             return 0.0, 0.0
         most = MOST_SHARE * self._size()
@@ -295,7 +295,7 @@ class _Forced:
 
         def at(amplitude: float) -> tuple[str, float]:
             if amplitude not in tried:
-                status, numbers = self.swung(amplitude, period, ROUGHLY)
+                status, numbers = self.final_motion(amplitude, period, ROUGHLY)
                 tried[amplitude] = status, numbers[0]
             return tried[amplitude]
 
@@ -309,7 +309,7 @@ class _Forced:
         return _edge(departs, most), _edge(lost, most)
 
     def _size(self) -> float:
-        """Steady value of the input: at larger amplitudes load or velocity would change sign."""
+        """Steady value (SI units) of load or velocity, which would change sign at larger amplitudes of the input."""
         if self.kind == "drive-velocity":
             return abs(float(self.rig.drive.velocity))
         normal, shear = ("normal_force", "friction_force") if "." in self.output else ("normal_stress", "shear_stress")
@@ -320,7 +320,7 @@ class _Forced:
 
 
 def _unsettled(apart: list[float]) -> str:
-    """Describe periods that differ by `apart` from the 1st, 2nd, ... before: repeat later, drift, or irregular."""
+    """Status of a motion whose last period differs by `apart` from the 1st, 2nd, ... period before it."""
     for k, own in enumerate(apart[1:], start=2):
         if own < IRREGULARLY * apart[0]:
             return f"every {k}{'nd' if k == 2 else 'rd' if k == 3 else 'th'} period"
@@ -329,9 +329,9 @@ def _unsettled(apart: list[float]) -> str:
 
 
 def _edge(beyond: Callable[[float], bool], most: float) -> float:
-    """Smallest amplitude for which `beyond` holds; inf if it never does up to `most`.
+    """Smallest amplitude for which `beyond` is true; inf if there is none up to `most`.
 
-    Amplitudes are tried upwards and the first step is bisected: motion that larger amplitudes drive may repeat again.
+    Amplitudes are tried upwards and the first step is bisected: at larger ones motion may be periodic again.
     """
     low = most / 10**DECADES
     if beyond(low):

@@ -20,7 +20,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.motion.status import remedy
 
 PERIODIC, NOT_SETTLED, IRREGULAR = "periodic", "not settled", "irregular"
-TOO_MANY_STEPS = "too many steps"  # says nothing of the motion
+TOO_MANY_STEPS = "too many steps"  # the simulation stopped; the motion may still be periodic
 EXPLAINED = {
     NOT_SETTLED: "the motion still drifts after the most periods that are waited for, so it has no answer yet",
     IRREGULAR: "the motion repeats in no few periods of the input: steady sliding is lost",
@@ -28,9 +28,9 @@ EXPLAINED = {
     "the motion; try a larger rtol (in Python), or fewer short periods",
 }
 BEYOND = "beyond the steady value"
-MEGA = 1e6  # of the prefix M
+MEGA = 1e6  # factor of the prefix M
 MOST_ROWS = 9  # periods listed in the text
-MOST_TOLD = 4  # resonances listed in the text
+MOST_RESONANCES = 4  # listed in the text
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,45 +41,45 @@ class FrequencyResponse(ReadOnly):
     ----------
     rig : Slider or Machine
     input : str
-        What swings: ``normal-stress``, ``drive-velocity``, ``push`` or ``injection``.
+        Oscillating input: ``normal-stress``, ``drive-velocity``, ``push`` or ``injection``.
     on : str or None
-        Body or contact of a machine that it acts on.
+        Body or contact of a machine on which the input acts.
     output : str
-        What answers: ``friction``, ``shear-stress``, ``guide.friction-force``, ...
+        Observable: ``friction``, ``shear-stress``, ``guide.friction-force``, ...
     names : tuple of str
-        The same in `steadyslip.build_model`: a name of ``inputs``, and one of ``observables``.
+        Names of input and output in the Model of `steadyslip.build_model`: one of its ``inputs`` and ``observables``.
     units : tuple of str
-        Of input and output.
+        SI units of input and output.
     periods : ndarray (n,)
-        s.
+        Periods of the input, s.
     gain, phase : ndarray (n,)
-        Of small amplitudes, from the linearised equations: amplitude of the output over that of the input, and by how
-        much it leads, degrees from -180 to 180.
+        For small amplitudes, from the linearised equations: amplitude of the output over that of the input, and its
+        phase lead, degrees from -180 to 180.
     amplitudes : ndarray (m,)
-        Of the input, where motion was simulated; may be empty.
+        Amplitudes of the input for which motion was simulated, SI units; may be empty.
     gains, phases : ndarray (m, n)
-        At these amplitudes: of the output's part that swings with the input's period.
+        Gain and phase at `amplitudes`, of the output's Fourier component with the input's period.
     shift : ndarray (m, n)
         Mean of the output less its steady value.
     mean_friction : ndarray (m, n)
-        Mean friction over mean normal stress (or force), of the slider or of the contact whose output it is; else NaN.
+        Mean friction over mean normal stress (or force) at the slider or the output's contact; NaN for other outputs.
     steady_friction : float
-        The same in steady sliding.
+        Friction coefficient in steady sliding, at the place of `mean_friction`.
     distortion : ndarray (m, n)
         Root of the sum of squares of all higher harmonics, over the amplitude of the first.
     status : ndarray of str (m, n)
         ``periodic``, ``every 2nd period`` and so on, ``irregular``, ``not settled``, or how the motion ended
-        (``blow-up``, ``contact lost``, ...); numbers are NaN where it did.
+        (``blow-up``, ``contact lost``, ...); the other arrays are NaN unless ``periodic``.
     linear_to, lost_at : ndarray (n,)
-        Amplitude up to which the gain is within 5 % of that of small ones, and amplitude at which steady sliding is
-        lost: motion ends, or no longer repeats with the input; as a rule it takes two periods first, and soonest at
-        half the period of a resonance. Stick-slip once in every period repeats and is not lost. NaN if not asked for,
-        inf where larger than the steady value of what swings, and 0 where less than a millionth of that.
+        Amplitude up to which the gain is within 5 % of that of small amplitudes, and amplitude at which steady sliding
+        is lost: motion ends, or no longer repeats with the input; as a rule it first repeats every second period, most
+        easily at half the period of a resonance. Stick-slip once in every period is periodic and not lost. NaN without
+        ``limits=True``, inf if above the steady value of the input's quantity, 0 if below a millionth of it.
     resonances : ndarray (r, 3)
-        Largest small-amplitude answers within the range of the periods, wherever they lie between them: period (s),
-        gain, phase (degrees); the largest gain first.
+        Maxima of the small-amplitude gain within the range of the periods, also between them: period (s), gain, phase
+        (degrees); the largest gain first.
     stable : bool
-        Whether steady sliding is stable; if not, no small periodic answer is ever reached.
+        True if steady sliding is stable; if not, no small periodic response is ever reached.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -110,7 +110,7 @@ class FrequencyResponse(ReadOnly):
 
     @property
     def shown_units(self) -> tuple[tuple[float, str], tuple[float, str]]:
-        """Factor and display unit of input and output; forces where the rig has an area."""
+        """Factor and display unit of input and of output; stresses become forces if the rig has an area."""
         return outside(self.units[0], self._area), outside(self.units[1], self._area)
 
     @property
@@ -119,14 +119,14 @@ class FrequencyResponse(ReadOnly):
 
     @property
     def gain_unit(self) -> tuple[float, str]:
-        """Factor and unit of the gain in tables; the unit is empty where input and output have the same one."""
+        """Factor and unit of the gain in tables; the unit is empty where input and output have equal units."""
         (below, given), (above, answered) = self.shown_units
         divisor = f"({given})" if set(given) & set("/ ") else given
         return above / below, "" if given == answered else f"{answered}/{divisor}"
 
     @property
     def drawn_gain_unit(self) -> tuple[float, str]:
-        """Factor and unit of the gain in figures: those of tables, but per MPa of a stress."""
+        """Factor and unit of the gain in figures: as `gain_unit`, but per MPa if the input is a stress."""
         factor, unit = self.gain_unit
         return (MEGA * factor, f"{unit.removesuffix('Pa')}MPa") if unit.endswith("/Pa") else (factor, unit)
 
@@ -139,7 +139,7 @@ class FrequencyResponse(ReadOnly):
             lines.append(f"  {period:>12}  {self._gain(self.gain[i])}  {self.phase[i]:.4g} deg{self._limits_at(i)}")
         if len(self.periods) > MOST_ROWS:
             lines.append(f"{MOST_ROWS} of {len(self.periods)} periods; files and JSON have all")
-        for period, gain, phase in self.resonances[:MOST_TOLD]:
+        for period, gain, phase in self.resonances[:MOST_RESONANCES]:
             place = format_quantity(period, "s")
             lines.append(f"resonance  period {place}, gain {self._gain(gain)}, phase {phase:.4g} deg")
         for j, amplitude in enumerate(self.amplitudes):
@@ -158,7 +158,7 @@ class FrequencyResponse(ReadOnly):
         return format_quantity(amplitude, self.units[0], area=self._area)
 
     def _gain(self, gain: float) -> str:
-        """Format a gain: per MPa of a stress or per unit of another input; a number if input and output are alike."""
+        """Format a gain: per MPa of a stress, per unit of another input; a number if the units are equal."""
         factor, unit = self.gain_unit
         if not unit:
             return f"{factor * gain:.5g}"
@@ -176,7 +176,7 @@ class FrequencyResponse(ReadOnly):
         )
 
     def _explained(self) -> list[str]:
-        """One line for each status in the tables that is not an answer."""
+        """One explaining line for each status in the tables other than ``periodic``."""
         found = dict.fromkeys(self.status.ravel().tolist())
         return [f"{one}: {self._explanation(one)}" for one in found if one != PERIODIC]
 
@@ -186,7 +186,7 @@ class FrequencyResponse(ReadOnly):
         return EXPLAINED.get(status) or remedy(status, self.rig)
 
     def _limits_at(self, i: int) -> str:
-        """Both limits of amplitude at a period, for its row; empty where they were not asked for."""
+        """Format both limits of amplitude at period `i`; empty if limits were not computed."""
         ends = [self.told(one[i]) if np.isfinite(one[i]) else BEYOND for one in (self.linear_to, self.lost_at)]
         return "" if np.isnan(self.linear_to[i]) else ", linear to {}, lost from {}".format(*ends)
 
@@ -213,9 +213,9 @@ class FrequencyResponse(ReadOnly):
         }  # fmt: skip
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write one row for each period and amplitude; amplitude 0 stands for small ones.
+        """Write one row for each period and amplitude; amplitude 0 is the limit of small amplitudes.
 
-        What does not exist is ``nan``. Forces where the rig has an area.
+        Missing values are ``nan``. Stresses become forces if the rig has an area.
 
         Raises
         ------
@@ -244,7 +244,7 @@ class FrequencyResponse(ReadOnly):
 
 
 def _some(count: int) -> list[int]:
-    """Indices of at most `MOST_ROWS` lines of a table."""
+    """Evenly spread indices of at most `MOST_ROWS` of `count` rows."""
     return sorted({round(i) for i in np.linspace(0, count - 1, min(count, MOST_ROWS))})
 
 

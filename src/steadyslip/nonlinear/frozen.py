@@ -33,9 +33,9 @@ from steadyslip.protocol.inputs import inputs_at, segment_of
 from steadyslip.protocol.protocol import LOAD_POINT
 from steadyslip.protocol.segments import pack
 
-MOMENTS = 1000  # times of evaluation, besides those at jumps
-REFINED = 100  # times of evaluation between two successive ones with different verdicts
-DEPARTED = 2.0  # ratio of slip rate to that asked for above which motion counts as departed, as for a slip event
+MOMENTS = 1000  # number of evenly spaced times of evaluation; those at jumps are added
+REFINED = 100  # number of times of evaluation between two neighbours with different verdicts
+DEPARTED = 2.0  # ratio of slip rate to the commanded one above which motion has departed, as for a slip event
 ENDED = ("contact lost", "blow-up", "stuck", "no velocity")  # statuses that end both steady sliding and the motion
 
 
@@ -54,19 +54,20 @@ class FrozenVerdicts(ReadOnly):
         Parameters of the rig that the protocol changes, SI units: velocity of the drive, preloads; a preload less the
         injected pressure is the effective normal stress.
     labels : dict of str to str
-        Words for them: their names, or ``effective normal stress``.
+        Display names of the parameters in `values`: their names, or ``effective normal stress``.
     growth_rate : ndarray (n,)
         Of the leading eigenvalue, 1/s; NaN where there is no steady sliding.
     critical_stiffness : ndarray (n,)
-        Of a slider, Pa/m; NaN where there is none, and of machines.
+        Of a slider, Pa/m; NaN where there is none, and for machines.
     crossings : tuple of (float, str)
-        Times (s) at which the verdict changes, and to what: ``unstable``, ``stable`` or ``no steady sliding``.
+        Times (s) at which the verdict changes, each with the new one: ``unstable``, ``stable`` or ``no steady
+        sliding``.
     departure : float
-        Time (s) at which, after sliding is unstable for the first time, slip is twice as fast as the drive asks, and
-        twice as fast as then (a ramp of the load slows or quickens slip by itself), or at which it cannot go on; NaN if
-        that does not happen.
+        First time (s) after sliding became unstable at which slip is twice as fast as commanded and twice as fast as
+        when it became unstable (a ramp of the load by itself slows or speeds up slip), or at which motion cannot go
+        on; NaN if there is none.
     e_folds : float
-        Growth of a small disturbance from that time to the departure: integral of the growth rate.
+        Growth of a small disturbance between loss of stability and departure: integral of the growth rate.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -106,16 +107,16 @@ class FrozenVerdicts(ReadOnly):
 
     @cached_property
     def slip_rates(self) -> dict[str, Array]:
-        """Slip rate (m/s) over the run's own times, by contact; of a slider under ``""``."""
+        """Slip rate (m/s) at the times ``run["t"]``, by name of the contact (``""`` for a slider)."""
         return {name: self.run[f"{name}.slip_rate" if name else "v"] for name in self.rig.laws_by_contact()}
 
     def _at(self, time: float) -> str:
         found = {name: float(np.interp(time, self.t, own)) for name, own in self.values.items()}
-        shown = ((value, *self._shown(name)) for name, value in found.items())
-        return ", ".join(f"{label} {format_quantity(factor * value, unit)}" for value, label, factor, unit in shown)
+        rows = ((value, *self._display(name)) for name, value in found.items())
+        return ", ".join(f"{label} {format_quantity(factor * value, unit)}" for value, label, factor, unit in rows)
 
-    def _shown(self, name: str) -> tuple[str, float, str]:
-        """Label, factor and display unit of a changed parameter; forces where the rig has an area."""
+    def _display(self, name: str) -> tuple[str, float, str]:
+        """Label, factor and display unit of a changed parameter; stresses become forces if the rig has an area."""
         factor, unit = outside(self.rig.parameters()[name].role.unit, self.rig.printed_area(name))
         label = self.labels[name]
         return label.replace("normal stress", "normal force") if unit == "N" else label, factor, unit
@@ -137,7 +138,7 @@ class FrozenVerdicts(ReadOnly):
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write one row for each moment: changed parameters, growth rate, critical stiffness, slip rates of the motion.
 
-        What does not exist is ``nan``. Forces where the rig has an area.
+        Missing values are ``nan``. Stresses become forces if the rig has an area.
 
         Raises
         ------
@@ -146,7 +147,7 @@ class FrozenVerdicts(ReadOnly):
         """
         columns = {"time (s)": self.t}
         for name, own in self.values.items():
-            label, factor, unit = self._shown(name)
+            label, factor, unit = self._display(name)
             columns[f"{label} ({unit})"] = factor * own
         columns["growth rate (1/s)"] = self.growth_rate
         if self.rig.default_along:
@@ -189,14 +190,14 @@ def frozen_verdicts(
 ) -> FrozenVerdicts:
     """Verdict at every moment of a slow change of load, velocity or pressure, beside the motion.
 
-    At each moment the protocol's load-point velocity, normal stresses and injected pressures are taken for constant,
-    and the stability of that steady sliding is asked. It says what a rig would do if it were changed slowly enough;
-    motion departs later, because disturbances need time to grow, or earlier, where changes are themselves a kick.
+    At each moment the protocol's load-point velocity, normal stresses and injected pressures are held constant, and
+    the stability of steady sliding with these values is computed. The verdict is that of an infinitely slow change;
+    motion departs later, because disturbances need time to grow, or earlier, where a change is itself a kick.
 
     Parameters
     ----------
     rig : Slider or Machine
-        Contacts that are pressed or injected at have a load of their own, `preload` as a rule.
+        Contacts whose normal stress or pore pressure the protocol changes need a parameter of load, such as `preload`.
     protocol : Protocol, Piece or sequence of Piece
         Changes of the drive's velocity, of normal stresses and of injected pressures.
     until : float or str, optional
@@ -213,10 +214,10 @@ def frozen_verdicts(
     Raises
     ------
     NotAvailable
-        If the protocol pushes a body or lets the drive go, or a contact counts its normal stress from the steady
-        sliding at the start: such a state is no steady sliding of the rig with other values.
+        If the protocol pushes a body or releases the drive, or a contact refers its normal stress to the steady
+        sliding at the start: these are not steady sliding with other parameters.
     ParameterError
-        If anything given is wrong.
+        If an argument is not allowed.
 
     Examples
     --------
@@ -257,8 +258,8 @@ class _Slow:
         if self.acting.pushes:
             raise NotAvailable("a push or creep has no verdict of its own; change velocity, normal stress or injection")
         _refuse_remembered(rig)
-        self.changes: dict[str, dict[int, float]] = {}  # of parameters by a unit of a channel
-        self.effective: dict[str, str] = {}  # words for loads less an injected pressure
+        self.changes: dict[str, dict[int, float]] = {}  # change of each parameter per unit of each input channel
+        self.effective: dict[str, str] = {}  # display names of loads reduced by an injected pressure
         for channel, kind, target in self.acting.named().values():
             if kind == "press":
                 contact, injected = target.removesuffix(PORES), target.endswith(PORES)
@@ -275,7 +276,7 @@ class _Slow:
         return np.unique(np.concatenate([np.linspace(0.0, end, MOMENTS), breaks, before]))
 
     def values(self, t: Array) -> dict[str, Array]:
-        """Parameters over times, SI units."""
+        """Values (n,) of drive velocity and changed loads at times `t` (n,), s; SI units, by name of the parameter."""
         lane = np.zeros(len(t), dtype=int)
         inputs = inputs_at(self.segments, lane, segment_of(self.segments, lane, t), t)
         found = {"drive.velocity": inputs[:, LOAD_POINT]}
@@ -285,24 +286,25 @@ class _Slow:
         return found
 
     def growth_rate(self, values: dict[str, Array]) -> Array:
-        """Largest growth rate, 1/s; NaN where there is no steady sliding."""
+        """Growth rate (n,) of the leading eigenvalue, 1/s; NaN where there is no steady sliding."""
         return self._where_it_slides(growth_rate, values)
 
     def critical_stiffness(self, values: dict[str, Array]) -> Array:
-        """Pa/m, of a slider; else NaN."""
+        """Critical stiffness (n,) of a slider, Pa/m; NaN for a machine."""
         if self.rig.default_along:
             return self._where_it_slides(critical_stiffness, values)
         return np.full(len(values["drive.velocity"]), np.nan)
 
-    def _where_it_slides(self, asked: Callable[..., Any], values: dict[str, Array]) -> Array:
+    def _where_it_slides(self, quantity: Callable[..., Any], values: dict[str, Array]) -> Array:
+        """A quantity (n,) of the rig with changed parameters; NaN where velocity or a load is not positive."""
         sliding = np.logical_and.reduce([own > 0 for own in values.values()])
         found = np.full(len(sliding), np.nan)
         if np.any(sliding):
-            found[sliding] = asked(self.rig, {name: own[sliding] for name, own in values.items()})
+            found[sliding] = quantity(self.rig, {name: own[sliding] for name, own in values.items()})
         return found
 
     def crossings(self, t: Array, rates: Array) -> Iterator[tuple[float, str]]:
-        """Times (s) at which the verdict changes, and the new verdicts."""
+        """Yield times (s) at which the verdict changes, each with the new verdict."""
         for i in _changes(rates):
             between = np.linspace(t[i - 1], t[i], REFINED)
             own = self.growth_rate(self.values(between))
@@ -314,31 +316,31 @@ class _Slow:
 
 
 def _changes(rates: Array) -> Array:
-    """Indices at which the verdict differs from the one before."""
+    """Indices of the growth rates (n,) whose verdict differs from that of the one before."""
     verdicts = np.array([_verdict(one) for one in rates])
     return np.flatnonzero(verdicts[1:] != verdicts[:-1]) + 1
 
 
 def _contacts(rig: Slider | Machine) -> dict[str, tuple[ContactLaw, float]]:
-    """Contact laws by the prefix of their parameters, and the area (m²) by which forces are divided."""
+    """Contact law and area (m², 1 if the rig has none) of each contact, by the prefix of its parameters' names."""
     return {f"{own.prefix}contact.": (own.contact, own.area or 1.0) for own in rig.laws_by_contact().values()}
 
 
 def _refuse_remembered(rig: Slider | Machine) -> None:
-    """Refuse contact laws that refer to steady sliding at the start, as their reference cannot follow the protocol."""
+    """Raise NotAvailable for contact laws that refer to steady sliding at the start: a protocol cannot change that."""
     seen = {one.name: sp.Symbol(one.name) for one in fields(ContactInputs)}
     for prefix, (law, _) in _contacts(rig).items():
         memory = {f"{kind}memory": tuple(sp.symbols([f"{kind}{n}" for n in law.memory()])) for kind in ("", "steady_")}
         stress = sp.sympify(law.normal_stress(ContactInputs(**seen | memory)))
         if any(one.name == "lead" or one.name.startswith("steady_") for one in stress.free_symbols):
             raise NotAvailable(
-                f"{prefix.rstrip('.')} counts its normal stress from the steady sliding at the start, which a slow "
+                f"{prefix.rstrip('.')} refers its normal stress to the steady sliding at the start, which a slow "
                 "change leaves; give a preload in place of steady_normal_stress, and none that depends on displacement"
             )
 
 
 def _load_of(rig: Slider | Machine, contact: str) -> tuple[str, float]:
-    """Parameter to which a change of normal stress adds, and the amount per unit of the channel."""
+    """Name of the load parameter of a contact, and its change per unit of the channel that changes normal stress."""
     prefix = f"contacts.{contact}.contact." if contact else "contact."
     law, area = _contacts(rig)[prefix]
     load = law.load()
@@ -351,12 +353,12 @@ def _load_of(rig: Slider | Machine, contact: str) -> tuple[str, float]:
 
 
 def _departure(found: FrozenVerdicts, begun: float) -> float:
-    """Time (s) at which slip is first `DEPARTED` times faster than the drive asks and than when it became unstable."""
+    """First time (s) at which slip is `DEPARTED` times faster than commanded and than at time `begun` (s)."""
     run = found.run
-    asked = run["load_velocity"] / run["load_velocity"][0]
+    commanded = run["load_velocity"] / run["load_velocity"][0]
     apart = np.zeros(len(run["t"]), dtype=bool)
     for own in found.slip_rates.values():
-        apart |= own > DEPARTED * np.maximum(own[0] * asked, np.interp(begun, run["t"], own))
+        apart |= own > DEPARTED * np.maximum(own[0] * commanded, np.interp(begun, run["t"], own))
     late = np.flatnonzero(apart & (run["t"] >= begun))
     if not late.size and run.status in ENDED and run.end >= begun:
         return run.end

@@ -1,4 +1,4 @@
-"""Bound on structures in stages whose work grows with the square and cube of the number of variables."""
+"""Limit of the degrees of freedom of structures for analyses whose work grows fast with their number."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.model.equations import Model
 
 MOST_INNER = 8
-"""Most degrees of freedom of structures: a branch of cycles takes 5 CPU s with 3 and 14 with 5, code alone minutes with
-24; the neighbourhood that surely returns has as many terms as the fourth power of the variables."""
+"""Largest number of degrees of freedom of structures: a branch of cycles takes 5 CPU s with 3, 14 with 5, and with 24
+minutes for compilation alone; a basin's neighbourhood has terms by the fourth power of the number of variables."""
 
 
 def refuse_many_inner(model: Model, what: str) -> None:
-    """Raise NotAvailable if structures have too many degrees of freedom for `what`."""
+    """Raise NotAvailable if structures have too many degrees of freedom for `what` (plural noun in the message)."""
     count = sum(one.inner for one in model.coordinates)
     if count > MOST_INNER:
         raise NotAvailable(

@@ -22,9 +22,10 @@ from steadyslip.model.taylor import Taylor, taylor
 
 EPS = float(np.finfo(float).eps)
 RIDGE = 1e-9
-"""Fixes what factors leave open, one for all rows against one for all columns, and moves them by that little."""
+"""Added to the diagonal of the least-squares matrix, which is singular: a factor of all rows and its inverse of all
+columns cancel. Changes the scales by a share of about 1e-9."""
 EVEN_STEPS = 20
-"""Of alternating rows and columns: entries that begin within a few decades of one have settled to a few per cent."""
+"""Scalings of all rows and columns in turn; entries within a few decades of 1 then change by a few per cent at most."""
 
 
 @dataclass(frozen=True)
@@ -36,17 +37,17 @@ class Cubic:
     c1 : ndarray (m,)
         Growth rate of the amplitude per squared amplitude of ln v at `contact`, 1/s; NaN beyond floating point.
     error : ndarray (m,)
-        By how much rounding, of the rig's numbers and in the computation, may have changed it, 1/s.
+        Bound of the change of c1 by rounding of the rig's numbers and in the computation, 1/s.
     share : ndarray (m,)
-        |c1| over the sizes of the terms that it is the sum of.
+        |c1| over the sum of the absolute values of its terms; small where they cancel.
     stress_ratio : ndarray (m,)
-        Amplitude of the spring stress (Pa), of machines of the pull (N), for unit amplitude of ln v.
+        Amplitude of the spring stress (Pa), for machines of the pull (N), per unit amplitude of ln v at `contact`.
     contact : ndarray of int (m,)
-        Where slip oscillates most, as a share of its velocity.
+        Index of the contact at which slip rate oscillates most, relative to its steady value.
     shares : ndarray (m, contacts)
-        Amplitude of ln v at each over that at `contact`.
+        Amplitude of ln v at each contact over that at `contact`.
     vector : ndarray (m, n)
-        Critical eigenvector of unit amplitude of ln v there, in the unknowns of `steadyslip.model.taylor.System`.
+        Critical eigenvector with unit amplitude of ln v at `contact`, unknowns as `steadyslip.model.taylor.System`.
     """
 
     c1: Array
@@ -67,7 +68,7 @@ def coefficients(point: OperatingPoint, omega: Array) -> Cubic:
     point : OperatingPoint
         Flat arrays, (m,).
     omega : ndarray (m,)
-        Angular frequency there, rad/s.
+        Angular frequency of each rig at its edge, rad/s.
     """
     expansion = taylor(point)
     size = max(len(omega), len(expansion.gradient))
@@ -108,7 +109,7 @@ def _projected(expansion: Taylor, omega: Array, speeds: Array, areas: Array) -> 
     each = np.arange(len(q))
     size = (0.5 / relative[each, most])[:, None]
     q, q_error = q * size, q_error * np.abs(size)
-    share = np.abs(q_error / q)[each, np.asarray(v)[most]]  # of the amplitude to which all refer
+    share = np.abs(q_error / q)[each, np.asarray(v)[most]]  # relative error of the amplitude of ln v at `contact`
     product = np.sum(p.conj() * _times(weight, q), axis=1)[:, None]
     lost = np.abs(p) * _times(np.abs(weight), q_error) + p_error * _times(np.abs(weight), np.abs(q))
     share = 2 * share + np.sum(lost, axis=1) / np.abs(product[:, 0])
@@ -142,8 +143,7 @@ def _projected(expansion: Taylor, omega: Array, speeds: Array, areas: Array) -> 
 class _Scaled:
     """Matrices (m, n, n) scaled by rows and columns to entries of similar size, with componentwise error bounds.
 
-    Errors are componentwise: a solution is as far off as the errors of entries, and of the rounding of n products,
-    move it to first order.
+    Error bounds are first order in the errors of the entries and in the rounding of n products.
     """
 
     def __init__(self, rows: Array, columns: Array, matrix: Array, error: Array) -> None:
@@ -154,7 +154,7 @@ class _Scaled:
         self.error = rows[:, :, None] * error * columns[:, None, :] + n * EPS * np.abs(self.matrix)
 
     def solve(self, right: Array, right_error: Array) -> tuple[Array, Array]:
-        """Solve for a right side (m, n); the error is infinite where rounding makes a matrix singular."""
+        """Solution (m, n) for a right side (m, n), and its error bound: infinite where a matrix is nearly singular."""
         singular = np.linalg.cond(self.matrix) > 1 / EPS
         matrix = np.where(singular[:, None, None], np.eye(self.matrix.shape[-1]), self.matrix)
         inverse = np.linalg.inv(matrix)
@@ -164,10 +164,10 @@ class _Scaled:
         return self.columns * found, self.columns * error
 
     def null_vectors(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Right and left singular vectors of the smallest singular value, each with its error."""
+        """Right and left singular vectors (m, n) of the smallest singular value, each with its error bound."""
         left, values, right = np.linalg.svd(self.matrix)
         others = (1 / values[:, None, :-1]) * left[:, :, :-1]
-        inverse = np.abs(others @ right[:, :-1]).swapaxes(1, 2)  # of what is orthogonal to both
+        inverse = np.abs(others @ right[:, :-1]).swapaxes(1, 2)  # pseudo-inverse without the smallest singular value
         found = []
         for vector, error, own, scale in (
             (right[:, -1].conj(), self.error, inverse, self.columns),
@@ -186,9 +186,8 @@ def _times(matrix: Array, vector: Array) -> Array:
 def even_scales(size: Array) -> tuple[Array, Array]:
     """Factors for rows and columns (m, n) that bring the entries of matrices to similar size, in any units.
 
-    First those with which the logarithms of the entries that are not zero are least in the mean square (Curtis and
-    Reid 1972): they turn with the units. Then all rows and columns are brought towards the same length, where small
-    entries count little.
+    First, the mean square logarithm of the non-zero entries is minimised (Curtis and Reid 1972), which makes the
+    result independent of units. Then rows and columns are scaled to similar Euclidean length.
     """
     count, n = size.shape[:2]
     rows, columns = np.ones((count, n)), np.ones((count, n))

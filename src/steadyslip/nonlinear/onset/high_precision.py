@@ -1,8 +1,8 @@
-"""Compute the cubic coefficient to fifty digits, where double precision cannot tell its sign.
+"""Compute the cubic coefficient to fifty digits, where double precision leaves its sign open.
 
-Steady sliding, the place of the edge and the critical eigenvector are found together: what ordinary numbers know of
-them is made better by Newton's method, whose residuals have fifty digits and whose matrix has ordinary ones. The two
-linear equations of the coefficient are solved in the same way.
+Steady sliding, the position of the edge and the critical eigenvector are solved for together, by Newton's method from
+their values in double precision, with residuals in fifty digits and a Jacobian in double precision. The linear
+equations of the coefficient are solved in this way too (iterative refinement).
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.taylor import EPS, Index, arrangements, system
 from steadyslip.nonlinear.onset.coefficient import even_scales
 
-DIGITS = 50  # three times those of floating point: products of three numbers keep all of theirs
+DIGITS = 50  # three times those of double precision: products of three such numbers are exact
 SETTLED = mpmath.mpf("1e-30")
-"""Step of Newton's method, as a share of what it corrects, after which it ends: the next would be far smaller still."""
+"""Relative Newton step at which the iteration stops: the next step would be smaller by the digits of the matrix."""
 STEPS = 40
-"""Every step gains as many digits as the matrix has right; at one a step all are there."""
+"""Limit of Newton steps; each gains as many digits as the matrix has correct ones, so at one digit each 40 suffice."""
 NOTHING = 1e-20
-"""Times the error in ordinary digits: of that fifty digits leave 1e-34 where the coefficient is zero."""
+"""c1 below this share of its error in double precision counts as zero; where it vanishes, fifty digits leave 1e-34."""
 STEP = 1e-6
-"""Relative step of differences for Newton's matrix: rounding and curvature then leave nine digits of it."""
+"""Relative step of the central differences for the Jacobian, which then has nine correct digits."""
 Numbers = list[Any]
 
 
@@ -41,28 +41,28 @@ class _NoConvergence(ArithmeticError):
 def coefficient(
     point: OperatingPoint, along: str, omega: float, contact: int, vector: Array, error: float
 ) -> tuple[float, float] | None:
-    """c1 (1/s) of one rig on an oscillatory edge, and its change when each number of the rig is rounded once (1/s).
+    """c1 (1/s) of one rig on an oscillatory edge, and a bound of its change if the rig's numbers are rounded (1/s).
 
     Parameters
     ----------
     point : OperatingPoint
-        Of one rig, flat.
+        One rig, arrays of length 1.
     along : str
-        A parameter of the model that leads across the edge.
+        Model parameter that is solved for, so that the rig lies on the edge.
     omega : float
         Angular frequency, rad/s.
     contact : int
-        Number of the contact to whose ln v amplitudes refer.
+        Index of the contact to whose ln v amplitudes refer.
     vector : ndarray (n,)
         Critical eigenvector.
     error : float
-        Of c1 in ordinary digits.
+        Error of c1 in double precision, 1/s.
 
     Returns
     -------
     tuple or None
-        Twice 0 where c1 vanishes in exact arithmetic; None where the edge is not a simple one, beyond numbers, and
-        with a delay.
+        (0, 0) where c1 vanishes in exact arithmetic; None for rigs with a delay, where numbers overflow, and where the
+        critical eigenvalue is multiple.
     """
     if point.model.delays:
         return None
@@ -134,7 +134,7 @@ class _Rig:
         self.inverses: tuple[_Inverse, ...] = ()
 
     def coefficient(self, arguments: Numbers) -> Any:
-        """c1 at these parameters, of which the one along the edge is solved for."""
+        """c1 (1/s) for model arguments in fifty digits; the parameter `along` is solved for."""
         unknowns = self.newton.refined(lambda y: self._residuals(arguments, y), self.start)
         values, omega, q = self._split(arguments, unknowns)
         gradient = self._entries(self.linear(*values))
@@ -147,7 +147,7 @@ class _Rig:
             gradient,
             [*gradient, *((i, i, -2 * one) for i, one in enumerate(oscillating) if one)],
         )
-        # of the left vector: Aᵀ π + b t = 0 and (M q)ᵀ π = 1, with t = 0
+        # bordered system of the left eigenvector π: Aᵀ π + q* t = 0 and (M q)ᵀ π = 1, with t = 0
         n = self.n
         bordered = [(j, i, e) for i, j, e in matrices[0]]
         bordered += [(i, n, one) for i, one in enumerate(conjugate)] + [(n, i, one) for i, one in enumerate(moving)]
@@ -219,14 +219,14 @@ class _Rig:
         return [(i, j, e) for (i, j), e in zip(self.system.entries[0], found, strict=False)]
 
     def _higher(self, found: Numbers) -> tuple[Callable[..., Numbers], Callable[..., Numbers]]:
-        """Functions that apply the second and third derivatives to directions."""
+        """Second and third derivatives as multilinear functions of direction vectors (n,)."""
         second = list(zip(self.system.entries[1], found, strict=False))
         third = list(zip(self.system.entries[2], found[len(second) :], strict=True))
         return lambda *u: _applied(second, u, self.n), lambda *u: _applied(third, u, self.n)
 
 
 def _applied(entries: Sequence[tuple[Index, Any]], directions: Sequence[Numbers], n: int) -> Numbers:
-    """Apply a symmetric derivative tensor, given by its entries, to directions."""
+    """Product (n,) of a symmetric derivative tensor, given by its distinct entries, with direction vectors (n,)."""
     out = [mpmath.mpf(0)] * n
     for (row, *index), value in entries:
         for arranged in arrangements(*index):
@@ -262,12 +262,12 @@ class _Inverse:
         self.inverse = np.linalg.inv(self.rows[:, None] * matrix * self.columns)
 
     def refined(self, residuals: Callable[[Numbers], Numbers], start: Numbers) -> Numbers:
-        """Find a zero of the residuals near `start`, by steps with this inverse.
+        """Zero of the residuals near `start`, in fifty digits, by Newton steps with this inverse.
 
         Raises
         ------
         _NoConvergence
-            If steps do not become small.
+            If the steps do not become smaller than `SETTLED`.
         """
         found = list(start)
         rows, columns = ([mpmath.mpf(float(one)) for one in own] for own in (self.rows, self.columns))
@@ -289,7 +289,7 @@ class _Inverse:
         raise _NoConvergence
 
     def solved(self, matrix: Sequence[tuple[int, int, Any]], right: Numbers) -> Numbers:
-        """Solve linear equations whose matrix, by entries, agrees with this inverse's up to rounding."""
+        """Solution of linear equations whose matrix (sparse entries) equals the inverted one up to rounding."""
         n = len(right)
 
         def missed(x: Numbers) -> Numbers:

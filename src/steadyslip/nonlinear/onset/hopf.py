@@ -1,13 +1,13 @@
 """Kind of onset (supercritical or subcritical) at an oscillatory edge of stability, from the cubic coefficient c1.
 
-At an oscillatory edge the amplitude ρ of ln(v/v0), of a machine at the contact where it is largest, obeys to lowest
+At an oscillatory edge the amplitude ρ of ln(v/v0) (of a machine: at the contact where it is largest) obeys to lowest
 order
 
     ρ' = Re(dλ/dp) (p − p_edge) ρ + c1 ρ³
 
 (theory 6). c1 < 0: supercritical, a small stable oscillation grows out of the edge on its unstable side.
-c1 > 0: subcritical, an unstable one shrinks onto steady sliding on its stable side, so that small kicks throw it out.
-c1 is local: it says nothing about large kicks.
+c1 > 0: subcritical, an unstable oscillation shrinks onto steady sliding on its stable side, so that small kicks make
+the rig leave steady sliding. c1 is local: it does not predict the effect of large kicks.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ from steadyslip.nonlinear.onset.coefficient import Cubic, coefficients
 from steadyslip.nonlinear.onset.high_precision import coefficient as in_digits
 
 TRUSTED = 1e-6
-"""Error of c1, as a share of it, above which it is computed once more with more digits."""
+"""Relative error of c1 above which it is computed again, in fifty digits."""
 WEAK = 1e-9
-"""Share of c1 in the terms that it is the sum of, down to which motion in sixteen digits sees it."""
+"""|c1| over the sum of the sizes of its terms, below which motion computed in double precision does not resolve it."""
 UNDECIDED = "not decided"
 
 
@@ -58,18 +58,18 @@ class Onset(Displayed):
     along : str
         The parameter that is varied.
     value : float
-        Its value at the edge, SI units.
+        Value of the parameter at the edge, SI units.
     unit : str
     kind : str
         ``supercritical``, ``subcritical``, ``degenerate`` (`coefficient` vanishes in exact arithmetic) or ``not
-        decided`` (it is below `coefficient_error`).
+        decided`` (`coefficient` is below `coefficient_error`).
     coefficient : float
-        c1, growth rate of amplitude per squared amplitude of ln v, 1/s; of a machine that at `contact`. NaN beyond
+        c1, growth rate of the amplitude per squared amplitude of ln v (of a machine: at `contact`), 1/s. NaN beyond
         floating point.
     coefficient_error : float
-        By how much rounding may have changed it, that of the rig's own numbers included, 1/s.
+        Bound of the change of c1 by rounding, that of the rig's own numbers included, 1/s.
     share : float
-        |c1| as a share of the terms that it is the sum of.
+        |c1| over the sum of the absolute values of its terms; small where they cancel.
     angular_frequency : float
         rad/s.
     growth_slope : float
@@ -140,13 +140,16 @@ class Onset(Displayed):
     def is_near(self) -> bool:
         """True if the rig is so near the edge that the predicted amplitude of ln v of its small cycle is below 1.
 
-        Friction knows velocity by ln v, so that small is an amplitude of ln v below one, a factor below e in velocity.
+        Friction depends on ln v, so an amplitude of ln v below 1 (velocity changes by a factor below e) is small.
         """
         own = self.rig.parameters()[self.along].value
         return own is not None and bool(self.velocity_amplitude(own) < 1.0)
 
     def stress_amplitude(self, value: Any) -> Any:
-        """Amplitude of the spring stress (Pa), or the pull at a machine's contact (N); as `velocity_amplitude`."""
+        """Amplitude of the spring stress (Pa), or of the pull at a machine's contact (N), at values of the parameter.
+
+        NaN and errors as for `velocity_amplitude`.
+        """
         return self.stress_ratio * self.velocity_amplitude(value)
 
     @property
@@ -163,7 +166,7 @@ class Onset(Displayed):
         return "\n".join([*lines, f"  {in_words(self.checks)}"])
 
     def _within(self) -> str:
-        """The error of the coefficient in words, where it matters."""
+        """Format the error of the coefficient, as " ± 0.1" in units of the frequency; empty if the sign is known."""
         return f" ± {self.coefficient_error / self.angular_frequency:.2g}" if self.kind == UNDECIDED else ""
 
 
@@ -189,7 +192,7 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
         Dotted name, or unique last part, of the parameter whose edge is meant; required for a machine with
         several stiffnesses.
     branch : int, optional
-        Which steady sliding, by rising normal stress, where a rig has several.
+        Index of the steady sliding, by rising normal stress, where a rig has several.
 
     Returns
     -------
@@ -198,7 +201,7 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
     Raises
     ------
     NotAvailable
-        If stability has no oscillatory edge in that parameter; says which edges there are.
+        If stability has no oscillatory edge in that parameter; the message lists the edges it has.
     UnknownNameError, ParameterError
         If the parameter is unknown.
 
@@ -259,7 +262,7 @@ def _points_at(rig: Slider | Machine, name: str, at: Any, branch: int) -> Operat
 def _growth_slope(rig: Slider | Machine, name: str, edge: Boundary, branch: int) -> float:
     """Re(dλ/dp) from the characteristic function, or from eigenvalues where its polynomial is too long to be written.
 
-    By central differences along the parameter, and Richardson's rule.
+    Central differences along the parameter, with Richardson extrapolation.
     """
     size = abs(edge.value) or 1e-3
     steps = np.array([1e-3, -1e-3, 5e-4, -5e-4]) * size
@@ -278,7 +281,7 @@ def _growth_slope(rig: Slider | Machine, name: str, edge: Boundary, branch: int)
 
 
 def _characteristic(point: OperatingPoint, s: complex) -> tuple[Array, Array]:
-    """Characteristic function of rigs at a place s (1/s), and its slope with s: (m,)."""
+    """Characteristic function (m,) of rigs at a complex s (1/s), and its derivative in s (m,)."""
     c, delays = quasipolynomial(point)
     n = np.arange(c.shape[-1])
     late = np.exp(-s * delays)
@@ -287,14 +290,14 @@ def _characteristic(point: OperatingPoint, s: complex) -> tuple[Array, Array]:
 
 
 def onsets(point: OperatingPoint, omega: Array, along: str) -> tuple[Cubic, Array]:
-    """Cubic coefficients of rigs on an oscillatory edge (flat, m), and in words the kinds of onset (m,).
+    """Cubic coefficients (m,) of rigs on an oscillatory edge, and their kinds of onset (m,), as in `Onset.kind`.
 
-    Where rounding may have changed a coefficient by more than `TRUSTED` of it, it is computed with more digits, the
-    edge being found anew along the parameter `along`.
+    Where the relative error of a coefficient exceeds `TRUSTED`, it is computed again in fifty digits, after solving for
+    the edge in the parameter `along` to as many.
     """
     found = coefficients(point, omega)
     c1, error = found.c1.copy(), found.error.copy()
-    name = along if along in point.model.parameters else "slider.stiffness"  # k where the axial one is given
+    name = along if along in point.model.parameters else "slider.stiffness"  # for axial stiffness too
     for i in np.flatnonzero(~(error <= TRUSTED * np.abs(c1))):
         own = point.part(np.array([i]))
         exact = in_digits(own, name, float(omega[i]), int(found.contact[i]), found.vector[i], float(error[i]))
@@ -307,7 +310,7 @@ def onsets(point: OperatingPoint, omega: Array, along: str) -> tuple[Cubic, Arra
 
 
 KINDS = ("none", "supercritical", "subcritical", "degenerate", UNDECIDED)
-"""Kinds of onset of many rigs, by the numbers that stand for them."""
+"""Kinds of onset; `onset_map` returns indices into this tuple."""
 
 
 def onset_map(
@@ -319,15 +322,15 @@ def onset_map(
     ----------
     rig : Slider or Machine
     vary : mapping of str to array_like or xarray.DataArray, optional
-        Parameters by dotted name, SI units; they broadcast.
+        Arrays of values (SI units) by dotted name of the parameter; they are broadcast.
     along : str, optional
-        A parameter that enters the equations linearly; of a slider its stiffness unless given.
+        A parameter that enters the equations linearly; by default a slider's stiffness.
 
     Returns
     -------
     dict of str to ndarray or xarray.DataArray
-        ``kind`` (place in `KINDS`, ``none`` where there is no such edge), ``edge`` (SI; of the gain kp for a rig
-        without spring) and ``coefficient`` (c1, 1/s), both NaN there.
+        ``kind`` (index into `KINDS`), ``edge`` (SI; of the gain kp for a rig without spring) and ``coefficient`` (c1,
+        1/s). Without an oscillatory edge ``kind`` is that of ``none``, and the others are NaN.
 
     Raises
     ------
@@ -339,7 +342,7 @@ def onset_map(
     point = operating_point(rig, vary)
     name = rig.parameter_along(along)
     unit = rig.parameters()[name].role.unit
-    name = name if name in point.model.parameters else "slider.stiffness"  # k too where the axial one is given
+    name = name if name in point.model.parameters else "slider.stiffness"  # as in `onsets`
     found = in_chunks(point, lambda part: _onsets(part, name))
     kind, edge, coefficient = np.moveaxis(np.asarray(found), -1, 0)
     return {
@@ -350,7 +353,7 @@ def onset_map(
 
 
 def _onsets(point: OperatingPoint, name: str) -> Array:
-    """Kind, edge and c1 of each rig, (..., 3), along a parameter."""
+    """Index of the kind of onset, edge (SI) and c1 (1/s) of each rig, array (..., 3), along the parameter `name`."""
     place = list(point.model.parameters).index(name)
     arguments = list(point.arguments)
     own = np.broadcast_to(arguments[place], point.shape).reshape(-1)

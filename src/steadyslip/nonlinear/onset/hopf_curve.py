@@ -30,22 +30,24 @@ from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve, tur
 from steadyslip.nonlinear.onset.coefficient import coefficients
 from steadyslip.nonlinear.onset.hopf import onsets
 
-DECADES = 6.0  # default range of a parameter to each side
-SMALLEST_FREQUENCY = 1e-4  # ratio to the frequency at the start below which the edge counts as one of divergence
+DECADES = 6.0  # default range of a parameter: decades to each side of the rig's value
+SMALLEST_FREQUENCY = 1e-4  # frequency over that at the start, below which the edge counts as one of divergence
 
 
 @dataclass(frozen=True)
 class SpecialPoint(Displayed):
-    """A point of the curve at which the kind of onset changes.
+    """A point of a Hopf curve at which the kind of onset changes.
 
     Attributes
     ----------
     kind : str
+        ``generalised Hopf``.
     values : dict of str to float
-        Parameters there, SI units.
+        Both parameters at the point, SI units.
     bracket : tuple of dict
-        Neighbouring points on both sides.
+        The parameters, as in `values`, at a point on each side.
     angular_frequency : float
+        rad/s.
     """
 
     kind: str
@@ -62,17 +64,17 @@ class HopfCurve(ReadOnly):
     ----------
     rig : Slider or Machine
     names, units : tuple of str
-        Of the two parameters.
+        Full names and SI units of the two parameters.
     first, second : ndarray (n,)
-        Points of the edge, SI units.
+        Values of the two parameters at the points of the edge, SI units.
     angular_frequency : ndarray (n,)
         rad/s.
     coefficient : ndarray (n,)
         Cubic coefficient c1 of the onset (1/s), see `steadyslip.hopf`.
     kind : ndarray of str (n,)
-        As `Onset.kind`.
+        Kind of onset, as `Onset.kind`.
     is_edge : ndarray of bool (n,)
-        False where another eigenvalue is unstable anyway, so that stability does not change.
+        False where another eigenvalue is unstable, so that stability does not change at this point.
     special : tuple of SpecialPoint
         ``generalised Hopf``: where the kind of onset changes.
     ends : tuple of str
@@ -133,9 +135,9 @@ def hopf_curve(
     between : mapping of str to (low, high), optional
         Ranges of the parameters; by default their domains, and six decades to each side of positive values.
     branch : int, optional
-        Which steady sliding, where there are several.
+        Index of the steady sliding, by rising normal stress, where a rig has several.
     spacing : float, optional
-        Largest distance of points, in natural logarithms of positive parameters or radians of angles.
+        Largest distance of neighbouring points, in natural logarithms of positive parameters or radians of angles.
 
     Returns
     -------
@@ -181,7 +183,7 @@ def hopf_curve(
 
 
 class _Plane:
-    """Conversion between two parameters with a frequency and coordinates of order one; the Hopf equations in these."""
+    """Hopf equations in coordinates (3,) of order one, and conversion to two parameters and a frequency."""
 
     def __init__(
         self, rig: Slider | Machine, names: tuple[str, str], between: Mapping[str, Sequence[Any]], branch: int
@@ -223,7 +225,7 @@ class _Plane:
         return np.array([*parts, np.log(omega / self.reference)])
 
     def parameters(self, u: Array) -> tuple[Array, Array, Array]:
-        """Both parameters and the frequency, from coordinates (..., 3)."""
+        """Both parameters (SI units) and the angular frequency (rad/s), each (...), from coordinates (..., 3)."""
         first, second = (
             scale * (np.exp(u[..., i]) if logarithmic else u[..., i])
             for i, (scale, logarithmic) in enumerate(zip(self.scales, self.logarithmic, strict=True))
@@ -231,7 +233,7 @@ class _Plane:
         return first, second, self.reference * np.exp(u[..., 2])
 
     def values(self, u: Array) -> OperatingPoint:
-        """Operating points at coordinates (m, 3); Failure outside the domain."""
+        """Operating points at coordinates (m, 3); raises Failure outside the domain."""
         first, second, _ = self.parameters(u)
         for column, role in zip((first, second), self.roles, strict=True):
             if not np.all(role.domain.contains(column)):
@@ -243,7 +245,7 @@ class _Plane:
         return found
 
     def _polynomials(self, u: Array) -> tuple[Array, Array]:
-        """Characteristic polynomial P(iβ) and the sum of the absolute values of its terms."""
+        """Characteristic polynomial P(iβ) at coordinates (m, 3), and the sum of absolute values of its terms; (m,)."""
         values = self.values(u)
         if not np.all(in_range(values)):
             raise Failure("numbers leave the range of floating point")
@@ -274,7 +276,10 @@ class _Plane:
 
 
 def _followed(curve: SolutionCurve, start: Point, plane: _Plane, spacing: float) -> tuple[list[Point], str]:
-    """Follow the curve one way: its points, and the reason for its end; the last lies on the limit of a range."""
+    """Points of the curve from `start` (not among them) along its tangent, and the reason for its end.
+
+    Where the curve leaves the range of a parameter, the last point lies on the limit.
+    """
     found: list[Point] = []
     here = start
     try:
@@ -295,7 +300,7 @@ def _followed(curve: SolutionCurve, start: Point, plane: _Plane, spacing: float)
 
 
 def _on_the_limit(curve: SolutionCurve, inside: Point, outside: Point, plane: _Plane) -> list[Point]:
-    """Locate the point at which the curve leaves the range of a parameter; empty if that fails."""
+    """List of the point at which the curve leaves the range of a parameter; empty if it is not found."""
     values = [plane.parameters(p.u) for p in (inside, outside)]
     for i, (low, high) in enumerate(plane.limits):
         a, b = float(values[0][i]), float(values[1][i])
@@ -313,7 +318,7 @@ def _on_the_limit(curve: SolutionCurve, inside: Point, outside: Point, plane: _P
 def _described(
     rig: Slider | Machine, plane: _Plane, curve: SolutionCurve, points: list[Point], ends: tuple[str, str]
 ) -> HopfCurve:
-    """Build the result: kinds of onset along the points, and where they change."""
+    """Result of `hopf_curve`, with the kind of onset at each point and the points at which it changes."""
     u = np.array([point.u for point in points])
     values = plane.values(u)
     first, second, omega = plane.parameters(u)

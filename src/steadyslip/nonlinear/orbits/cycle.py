@@ -1,4 +1,4 @@
-"""Result types for one cycle: `Cycle`, `CycleRange` per contact, `SpecialCycle` (bifurcation), `End` of a branch."""
+"""Result types of cycles: `Cycle`, `CycleRange` per contact, `SpecialCycle` (bifurcation), `End` of a branch."""
 
 from __future__ import annotations
 
@@ -24,12 +24,10 @@ def quantities(rig: Rig) -> dict[str, tuple[str, str]]:
     return {rig.result_name(name): (name, rig.result_unit(unit)) for name, unit in UNITS.items()}
 
 
-OPEN = 1e-4  # largest allowed closing error, as a share of the cycle's size; Newton's method leaves an order less
+OPEN = 1e-4  # largest allowed closing error, as a share of the cycle's size; Newton's method leaves a tenth of it
 IMPRECISE = 1e-3  # error of the trivial multiplier beyond which a cycle is rejected
-RETURNED = (
-    1e-5  # distance between returns of a motion, period after period, within which it shows that a cycle attracts
-)
-ALIKE = 1e-6  # relative difference within which cycles at one value of the parameter are one; Newton leaves less
+RETURNED = 1e-5  # largest distance between returns of a motion, a period apart, that proves an attracting cycle
+ALIKE = 1e-6  # largest relative difference between copies of one cycle; Newton's method leaves less
 UNCERTAIN = 3.0  # assumed ratio of the errors of other multipliers to that of the trivial one
 
 
@@ -40,13 +38,13 @@ class CycleRange(Displayed):
     Attributes
     ----------
     peak_velocity, lowest_velocity : float
-        m/s.
+        Extreme slip rates, m/s.
     amplitude : float
-        Half of ln(peak velocity/lowest velocity); infinite where slip stops or turns round.
+        Half of ln(peak velocity/lowest velocity); infinite where slip stops or reverses.
     force_drop : float
         Highest less lowest pull, N.
     lowest_normal_force, highest_normal_force : float
-        N.
+        Extreme normal forces, N.
     """
 
     peak_velocity: float
@@ -59,45 +57,45 @@ class CycleRange(Displayed):
 
 @dataclass(frozen=True, eq=False)
 class Cycle(Displayed):
-    """One periodic motion; of a machine its numbers are those at `contact`, in forces.
+    """One periodic motion; for a machine velocities and stresses (as forces) are those at `contact`.
 
     Attributes
     ----------
     value : float
-        Of the parameter, SI units.
+        Value of the parameter, SI units.
     period : float
         s.
     peak_velocity, lowest_velocity : float
-        m/s, located.
+        Extreme slip rates, m/s, located as events.
     amplitude : float
-        Half of ln(peak velocity/lowest velocity); infinite where the block stops or turns round.
+        Half of ln(peak velocity/lowest velocity); infinite where the block stops or reverses.
     stress_drop : float
-        Highest less lowest spring stress, Pa, its swing; the `stress_drop` of a `SlipEvent` ends where the block first
-        rests, and is smaller where ringing goes lower.
+        Highest less lowest spring stress in a period, Pa; the `stress_drop` of a `SlipEvent` ends where the block first
+        rests, and is smaller where later ringing reaches a lower stress.
     lowest_normal_stress, highest_normal_stress : float
-        Pa.
+        Extreme normal stresses, Pa.
     multipliers : tuple of complex
         Floquet multipliers by falling size, the trivial one (1) left out.
     trivial : float
-        The one that should be 1; its distance from 1 is a measure of precision.
+        Computed multiplier along the motion, in theory 1; its distance from 1 is a measure of precision.
     stable : bool
-        Whether the cycle attracts: all multipliers inside the unit circle.
+        True if the cycle attracts: all multipliers inside the unit circle.
     start : dict of str to float
-        State where the block, speeding up, is as fast as the load point: x, memory and, with mass, v, SI units, for
-        ``simulate(rig, initial=...)``. Of a machine: where `contact` slips as fast as in steady sliding.
+        State at which the block, accelerating, is as fast as the load point: x, memory and, with mass, v, SI units, for
+        ``simulate(rig, initial=...)``. Of a machine: at which `contact` slips as fast as in steady sliding.
     speed : float
         Slip rate in steady sliding, m/s.
     contact : str
-        Of a machine: the contact that the cycle is counted at; else empty.
+        Of a machine: the contact at which periods begin and numbers refer to; else empty.
     contacts : dict of str to CycleRange
-        Of a machine: all of them.
+        Of a machine: extremes at each contact, by name.
     closing : float
-        Distance of the end of one period from the cycle, by an integration of the motion alone, as a share of the
-        cycle's size: logarithms of large states, shares of natural sizes of small ones; or how early or late the end
-        is, as a share of the period, if that is more.
+        Closing error: distance between start and end of one period, integrated without sensitivities, as a share of
+        the cycle's size (logarithms of large states, multiples of natural sizes of small ones); or the error of the
+        period, as a share of it, if that is more.
     returned : float
-        Largest distance between returns of the simulated motion that led to the cycle, a period apart, over its last
-        two periods, in the same measure; NaN if none did.
+        For a cycle found by simulation: largest distance between states a period apart over its last two periods,
+        measured as `closing`; else NaN.
     """
 
     value: float
@@ -131,7 +129,7 @@ class Cycle(Displayed):
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """Two checks: the motion closes after a period; the largest multiplier is farther from 1 than its error."""
+        """Checks that the motion closes after a period, and that the largest multiplier differs from 1 by its error."""
         room = abs(self.growth - 1) / (UNCERTAIN * self.growth) if self.growth else IMPRECISE
         stability = check(
             "its stability", "the multiplier along the motion is 1", self.multiplier_error, min(IMPRECISE, room)
@@ -165,7 +163,7 @@ class SpecialCycle(Displayed):
     precision : float
         Estimated error of the parameter's value there, relative.
     index : int
-        Place in the branch: it lies before the cycle of this number.
+        Index of the branch's cycle that follows it.
     """
 
     kind: str
@@ -183,12 +181,12 @@ class End:
     Attributes
     ----------
     kind : str
-        ``onset``, ``edge`` (another at which cycles end in steady sliding), ``period doubling``, ``range`` (the limit
-        asked for), or ``last cycle`` (that could be followed, or that simulation found).
+        ``onset``, ``edge`` (another edge of stability, at which cycles shrink to steady sliding), ``period doubling``,
+        ``range`` (limit of the parameter), or ``last cycle`` (that could be followed, or that simulation found).
     value : float
-        Of the parameter, SI units.
+        Value of the parameter, SI units.
     cycle : Cycle or None
-        The cycle there; None in steady sliding.
+        The cycle at the end; None if that is steady sliding.
     """
 
     kind: str

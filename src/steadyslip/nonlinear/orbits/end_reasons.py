@@ -17,13 +17,13 @@ from steadyslip.nonlinear.orbits.cycle import IMPRECISE, Cycle, End, SpecialCycl
 from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.special import MET, ROUNDING, SMALL, BranchPoint, lies_between
 
-WINDINGS = 6  # folds, each closer to the next, after which a branch counts as winding round one value
-STANDING = 12  # cycles alike within 5 %, at one parameter value but for rounding, after which the branch stands still
-RETRACED = 4  # consecutive cycles between known neighbours after which the branch has turned back
-TOO_UNSTABLE = 1e8  # growth in a period: half the digits of floating point are lost in one
-SHRUNK = 0.5  # amplitude of ln v below which a cycle may be about to end in steady sliding
-LARGE = 1e6  # peak velocity, in units of the drive's, beyond which a cycle grows without bound
-STILL = 1e-3  # relative change of value and period, as a share of the peak's, below which they stand still
+WINDINGS = 6  # number of folds, each closer to the next, after which a branch winds round one value
+STANDING = 12  # number of cycles within 5 %, at one parameter value up to rounding, after which a branch ends
+RETRACED = 4  # number of consecutive cycles between known neighbours after which the branch has turned back
+TOO_UNSTABLE = 1e8  # growth of deviations in a period that loses half the digits of double precision
+SHRUNK = 0.5  # amplitude of ln v below which a cycle may be about to shrink to steady sliding
+LARGE = 1e6  # peak velocity over the drive's beyond which a cycle counts as growing without bound
+STILL = 1e-3  # relative change of value and period, over that of the peak velocity, below which they are constant
 ENDS = {
     "blow-up": "blow-up: the velocity of the massless model becomes infinite; give the {block} a mass or {damping} to "
     "follow the cycles further",
@@ -58,7 +58,7 @@ class EndRules:
     def finished(
         self, limits: tuple[float, float], before: BranchPoint, now: BranchPoint, first: BranchPoint, twice: bool
     ) -> tuple[str, bool]:
-        """Reason for which a piece ends at this cycle (empty if it goes on); True if the cycle still belongs to it."""
+        """Reason for which a piece ends at cycle `now` (empty if it goes on), and True if `now` still belongs to it."""
         low, high = limits
         cycle = now.cycle
         if not low < cycle.value < high:
@@ -89,7 +89,7 @@ class EndRules:
         return "", True
 
     def words(self, status: str, contact: str = "") -> str:
-        """Text of a reason, empty if there is none; names the contact of a machine."""
+        """Text for a status, with the contact of a machine; empty if the status is not in `ENDS`."""
         if status not in ENDS:
             return ""
         rig = self.flow.rig
@@ -99,7 +99,7 @@ class EndRules:
     def slows(self, now: BranchPoint) -> bool:
         """True if slip decelerates where the cycle starts: the continuation has passed a cycle of zero size.
 
-        With mass rounding in the state is most of the acceleration; what is carried round once is true.
+        With mass, rounding of the state may dominate its acceleration; that carried round the cycle once is accurate.
         """
         orbit = now.shooting.orbit(now.point.u)
         setting = self.flow.setting(orbit.value)
@@ -144,8 +144,8 @@ def winds(special: list[SpecialCycle]) -> bool:
 def retraces(known: list[Cycle]) -> bool:
     """True if the last cycles lie between earlier neighbours, in amplitude too: the continuation has turned back.
 
-    Periods and velocities of small cycles are alike, and where a branch begins upright, as at a degenerate onset, their
-    values are rounding: amplitudes tell that it goes on.
+    Small cycles differ little in period and velocity, and where a branch begins vertically, as at a degenerate onset,
+    their parameter values differ by rounding only: amplitudes show that the branch goes on.
     """
     last, passed = known[-RETRACED:], known[: -2 * RETRACED]
     if len(passed) < 2 or (known[-1].value - known[-2].value) * (known[-2].value - known[-3].value) < 0:
@@ -161,7 +161,7 @@ def _sized(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
 
 
 def stands(last: list[Cycle]) -> bool:
-    """True if the parameter changes by no more than rounding while the cycles hardly change."""
+    """True if the last `STANDING` cycles differ by less than 5 % and their parameter values by rounding only."""
     if len(last) < STANDING:
         return False
     value = np.array([cycle.value for cycle in last])

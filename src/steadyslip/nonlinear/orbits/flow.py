@@ -1,6 +1,6 @@
 """Integrate the motion over given times, with its derivatives in the starting state and one parameter.
 
-Cycles are fixed points of this map. Inputs are constant: `FlowRunner` takes them, and the rig, from prepared jobs.
+Cycles are fixed points of this map. Inputs are constant: `FlowRunner` takes inputs and rig from prepared `Jobs`.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from steadyslip.protocol.segments import Segments
 DONE = WORDS.index("done")
 NEVER = np.empty(0)
 STIFF = "rodas5p"  # Rosenbrock method of order 5, as tolerances are tight
-MOST_STEPS = 100_000  # of one run: some tenths of a second
-FAR_MORE, FEW_STEPS = 20, 5_000  # limit of a run: factor on the steps of the last one, and the least
-MORE = 8  # such a factor for runs next to a known one
-QUICKER = 4  # times as many steps without sensitivities take as long; of machines of three bodies
-HARDLY_HEARD = 1e6  # factor of the tolerances of sensitivities where they hardly affect the steps,
-UNHEARD = 1e12  # and where they are not to affect them
+MOST_STEPS = 100_000  # limit of integration steps of one run: some tenths of a second
+FAR_MORE, FEW_STEPS = 20, 5_000  # limit of steps of a run: factor on those of the last run, and least limit
+MORE = 8  # as FAR_MORE, for a run close to a known one
+QUICKER = 4  # ratio of the times of a step with and without sensitivities, for machines of three bodies
+HARDLY_HEARD = 1e6  # factor on the tolerances of sensitivities, so that they hardly affect step sizes
+UNHEARD = 1e12  # as HARDLY_HEARD, so that they do not affect step sizes
 NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are reused
 KINDS_EACH = len(LOG_KINDS) - 2  # number of event kinds at one contact
 
@@ -49,7 +49,7 @@ KINDS_EACH = len(LOG_KINDS) - 2  # number of event kinds at one contact
 class FlowFailure(Failure):
     """An integration that stopped before its end.
 
-    `status` is the reason, a word of `steadyslip.motion.status`; `contact` names the contact of a machine concerned.
+    `status` is the reason, one of `steadyslip.motion.status.WORDS`; `contact` is the contact of a machine concerned.
     """
 
     def __init__(self, status: str, contact: str = "") -> None:
@@ -58,7 +58,7 @@ class FlowFailure(Failure):
 
     @property
     def place(self) -> str:
-        """The reason, of a machine with the contact concerned."""
+        """Status, for machines followed by the contact concerned."""
         return f"{self.status} at {self.contact}" if self.contact else self.status
 
 
@@ -70,7 +70,7 @@ def _with_sensitivities(reduction: Reduction, method: str) -> Runner:
 
 @cached
 def _slip_shares(reduction: Reduction, contact: int) -> ArrayFunction:
-    """Derivative of slip at a contact in each state variable, and its steady slip rate over the drive's (cached)."""
+    """Derivatives of slip at a contact in each state variable, and steady slip rate over drive velocity (cached)."""
     sliding = reduction.slidings[contact]
     return reduction.model.function([*(derivative(sliding.slip, s) for s in reduction.state), sliding.ratio])
 
@@ -82,15 +82,15 @@ class FlowSetting:
     Attributes
     ----------
     value, unit : float
-        The parameter, and the size of change that derivatives in it refer to.
+        The parameter (SI units), and the change of it to which derivatives refer.
     point : OperatingPoint
-        Arrays of one number.
+        Arrays of length 1.
     inputs : ndarray (3,)
         Load-point velocity (m/s), disturbance and added normal stress (Pa); of machines also in rad/s, N and N m.
     slip : ndarray (n,)
-        How slip at the contact that is watched follows from the state, m.
+        Derivatives of slip (m) at the watched contact in the state variables.
     speed : float
-        At which that contact slips as fast as the load point goes, m/s.
+        Slip rate of the watched contact in steady sliding, m/s.
     plain, varied : tuple of ndarray
         Constants and settings (one row each) of the plain kernel and of the one with sensitivities.
     """
@@ -111,32 +111,33 @@ class FlowRunner:
     Parameters
     ----------
     jobs : Jobs
-        Prepared, with one segment for each run.
+        Prepared runs, with one segment each.
     which : int, optional
-        The run whose rig and inputs are meant.
+        Index of the run whose rig and inputs are used.
     rtol : float, optional
-        Error allowed per step; unless given 1e-10 for explicit methods, 1e-9 for Rosenbrock methods, 1e-8 if `costly`.
+        Relative error allowed per step; by default 1e-10 for explicit methods, 1e-9 for Rosenbrock methods, 1e-8 if
+        `costly`.
     contact : int, optional
-        The one at which cycles begin as it speeds up.
+        Index of the watched contact: a cycle begins where its slip, accelerating, passes the steady slip rate.
 
     Attributes
     ----------
     noise : float
-        Smallest absolute error, in natural sizes, that integration can keep to.
+        Smallest absolute error, in natural sizes, that integration can attain.
     size : int
         Number of state variables n.
     scales : ndarray (n,)
-        Their natural sizes, at the rig's own parameter.
+        Natural sizes of the state variables, at the rig's own parameter.
     time : float
         Natural time, s.
     steps : int
-        Taken so far, with sensitivities.
+        Integration steps so far, in equivalents of steps with sensitivities.
     rounding : float
-        Size of the error that rounding of forces makes in a state, in natural sizes, where it is known.
+        Error of a state by rounding of forces, in natural sizes; 0 if unknown.
     costly : bool
-        True of machines with mass, whose sensitivities take ten to a hundred times as long as the motion alone.
+        True for machines with mass, whose sensitivities take ten to a hundred times as long as the motion alone.
     slack : float
-        Factor of the tolerances of sensitivities: beyond 1 the motion leads the steps.
+        Factor on the tolerances of sensitivities: above 1 the error of the motion decides step sizes.
 
     Raises
     ------
@@ -185,7 +186,7 @@ class FlowRunner:
 
     @property
     def natural_slip(self) -> float:
-        """Natural size of slip at the contact that is watched, m."""
+        """Natural size of slip at the watched contact, m."""
         shares = np.abs(self.own.slip) > 0
         return float(np.min(self.scales[shares] / np.abs(self.own.slip[shares])))
 
@@ -205,7 +206,7 @@ class FlowRunner:
         self, point: OperatingPoint, inputs: Array, value: float = 0.0, unit: float = 1.0,
         rates: tuple[Array, Mapping[sp.Symbol, Array]] | None = None,
     ) -> FlowSetting:  # fmt: skip
-        """Build a setting; `rates` are the derivatives of constants and inputs in the parameter, per unit."""
+        """Setting at an operating point; `rates`: derivatives of constants and inputs in the parameter, per `unit`."""
         constants = self.machine.constants(point)
         settings = self._settings_at(point, value)
         scales, behind = settings[0, self.tolerances], self.tolerances.stop
@@ -220,7 +221,7 @@ class FlowRunner:
         )  # fmt: skip
 
     def _settings_at(self, point: OperatingPoint, value: float) -> Array:
-        """Kernel settings (tolerances, natural sizes), reused within `NEIGHBOURHOOD` of the parameter."""
+        """Kernel settings (tolerances, natural sizes) at a parameter value, cached within `NEIGHBOURHOOD` of it."""
         at, settings = self._near
         if not len(settings) or abs(value - at) > NEIGHBOURHOOD * abs(at):
             jobs = replace(self.base, point=point)
@@ -231,7 +232,7 @@ class FlowRunner:
     # -- runs
 
     def begin_motion(self) -> None:
-        """Forget how many steps the last run took: the next is of another motion, perhaps far longer."""
+        """Reset the limit of steps: the next run is of another motion than the last, perhaps far longer."""
         self._usual = MOST_STEPS
 
     def run(
@@ -242,10 +243,11 @@ class FlowRunner:
         Returns
         -------
         ends : ndarray (m, n)
+            Final states.
         sensitivities : ndarray (m, n, n)
-            In the starting state.
+            Derivatives of the final states in the starting states.
         slopes : ndarray (m, n)
-            In the parameter, per ``setting.unit``.
+            Derivatives of the final states in the parameter, per ``setting.unit``.
         """
         count, n = len(states), self.size
         initial = np.hstack([self._continuous(setting, states), self._unit(count)])
@@ -257,7 +259,7 @@ class FlowRunner:
             usual, self.slack = self.slack, UNHEARD
             try:
                 final = self._advanced(setting, self._sensitive_settings(setting, amplitude), initial, times)
-            except FlowFailure:  # the motion itself needs them: a point far off the curve, mostly
+            except FlowFailure:  # the motion itself needs the steps: mostly a point far off the curve
                 self.slack = usual
                 raise
         matrix = final[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
@@ -271,9 +273,9 @@ class FlowRunner:
     def _sensitive_settings(self, setting: FlowSetting, amplitude: float) -> Array:
         """Settings of the kernel with sensitivities.
 
-        Where the motion leads the steps, sensitivities follow with whatever error: frames that ring fast, little
-        damped and at rest in the motion itself, are in them with all their cycles. Rosenbrock methods damp what they
-        step over, and what is left is the derivative of the steps that are taken.
+        With `slack` above 1 the error of the sensitivities is not controlled: fast, little damped modes of frames, at
+        rest in the motion itself, oscillate in the sensitivities and would need tiny steps. Rosenbrock methods damp
+        modes that they step over, and the result is the derivative of the discrete steps.
         """
         settings, n, behind = self._finer(setting.varied[1], amplitude), self.size, self.tolerances.stop
         settings[:, SETTINGS.index("most_steps")] = min(MOST_STEPS, max(FEW_STEPS, self.far_more * self._usual))
@@ -292,14 +294,14 @@ class FlowRunner:
         return finer
 
     def _continuous(self, setting: FlowSetting, states: Array) -> Array:
-        """Continuous variables with which the kernel starts, from states (m, n)."""
+        """Continuous variables (m, n) that the kernel integrates, from states (m, n)."""
         found = setting.point.evaluate(restored_of(self.reduction), *states.T, *setting.inputs, 0.0)
         return np.column_stack(np.broadcast_arrays(*(np.atleast_1d(c) for c in found)))
 
     def _advanced(
         self, setting: FlowSetting, settings: Array, initial: Array, times: Array, machine: Runner | None = None
     ) -> Array:
-        """Integrate the system with sensitivities, or that of a plain `machine`; final values, or FlowFailure."""
+        """Final values with sensitivities, or without if a plain `machine` is given; raises FlowFailure."""
         if self.steps >= self.last_step:
             raise FlowFailure("too many steps")
         constants = (setting.plain if machine else setting.varied)[0]
@@ -315,7 +317,7 @@ class FlowRunner:
         return outcome.state
 
     def field(self, setting: FlowSetting, states: Array) -> tuple[Array, Array, Array]:
-        """Rates (m, n), their Jacobian (m, n, n) and their derivative in the parameter (m, n) at given states."""
+        """Time derivatives (m, n) of states (m, n), their Jacobian (m, n, n) and derivative in the parameter (m, n)."""
         count, n = len(states), self.size
         further = max(len(self.reduction.unknowns) - 1, 0)
         open_ = np.full((count, 1), np.nan)
@@ -334,12 +336,12 @@ class FlowRunner:
     ) -> Outcome:  # fmt: skip
         """Integrate once without sensitivities, with events, all steps, and samples at given times.
 
-        `unknowns` (u,) are those of the balances at `state`, NaN where they are not known.
+        `unknowns` (u,) are the solutions of the algebraic equations at `state`, NaN where they are not known.
 
         Raises
         ------
         FlowFailure
-            If it does not reach its end.
+            If the run stops before its end.
         KeyboardInterrupt
             If it was interrupted.
         """
@@ -359,7 +361,7 @@ class FlowRunner:
         return outcome
 
     def _failure(self, setting: FlowSetting, outcome: Outcome, row: int) -> FlowFailure:
-        """Build the FlowFailure of one run that stopped early, with the contact concerned."""
+        """FlowFailure of one run that stopped early, with the contact concerned."""
         status = WORDS[int(outcome.status[row])]
         names = [contact.name for contact in self.reduction.model.contacts]
         end = np.hstack([outcome.point[row, : 1 + self.size], outcome.point[row, 1 + outcome.size :]])[None]
@@ -370,7 +372,7 @@ class FlowRunner:
         return FlowFailure(status, names[int(ending_contact(setting.point, status, stresses, rates)[0])])
 
     def observed(self, setting: FlowSetting, times: Array, points: Array) -> dict[str, Array]:
-        """All observables at given points (m, 1 + n)."""
+        """All observables (m,), by name, at times (m,), s, and points (m, 1 + n) of a run."""
         rows = _rows(setting.inputs, np.array([float(times[-1]) or 1.0]))[0]
         waves = np.zeros((1, 1, 3, 0))
         segments = Segments(
@@ -382,11 +384,11 @@ class FlowRunner:
         return observe(jobs, self.machine, 0, zero, zero, times, points)
 
     def speeds(self, setting: FlowSetting, outcome: Outcome) -> Array:
-        """Slip rates at the contact that is watched (m/s): at the solver's steps and at events."""
+        """Slip rates at the watched contact (m/s), at events and at the solver's steps."""
         return self.at_contacts(setting, outcome)[self.contact][0]
 
     def at_contacts(self, setting: FlowSetting, outcome: Outcome) -> list[tuple[Array, Array, Array]]:
-        """Slip rate (m/s), normal stress and T (Pa, of machines N) of each contact, at solver's steps and events."""
+        """Slip rate (m/s), normal and spring stress (Pa, machines: N) of each contact, at events and solver steps."""
         record, log = outcome.recorded, outcome.log
         seen = self.observed(setting, record[:, Recorded.TIME], record[:, Recorded.POINT :])
         contacts = self.reduction.model.contacts
@@ -408,7 +410,7 @@ class FlowRunner:
 
 
 def states_between(runs: FlowRunner, setting: FlowSetting, record: Array, at: Array) -> Array:
-    """States at some times between recorded steps, by cubic Hermite interpolation."""
+    """States (m, n) at times `at` (m,), s, from recorded steps by cubic Hermite interpolation."""
     time, states = record[:, Recorded.TIME], record[:, Recorded.STATE : Recorded.STATE + runs.size]
     i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     h = (time[i + 1] - time[i])[:, None]
@@ -420,9 +422,9 @@ def states_between(runs: FlowRunner, setting: FlowSetting, record: Array, at: Ar
 
 
 def passages(runs: FlowRunner, setting: FlowSetting, record: Array) -> tuple[Array, Array]:
-    """Times at which slip, accelerating, passes the load point's velocity in a recorded run; its acceleration there.
+    """Times (s) at which slip, accelerating, passes the load point's velocity, and its acceleration there (m/s²).
 
-    Both by linear interpolation between steps.
+    Both by linear interpolation between recorded steps.
     """
     time, states = record[:, Recorded.TIME], record[:, Recorded.STATE : Recorded.STATE + runs.size]
     ahead = runs.field(setting, states)[0] @ setting.slip
@@ -432,7 +434,7 @@ def passages(runs: FlowRunner, setting: FlowSetting, record: Array) -> tuple[Arr
 
 
 def _rows(inputs: Array, times: Array) -> Array:
-    """Kernel table of one segment of constant inputs for each run."""
+    """Kernel table (m, 1, 9) of one segment of constant inputs for each run, of durations `times` (m,), s."""
     rows = np.zeros((len(times), 1, 9))  # start, end, jump, values, slopes
     rows[:, 0, 1] = times
     rows[:, 0, 3:6] = inputs

@@ -1,4 +1,4 @@
-"""Integrate the motion of a rig that is driven at its own velocity and not disturbed, with one free parameter."""
+"""Integrate the undisturbed motion of a rig under its steady drive, with one free parameter."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ class Flow(FlowRunner):
     rtol : float, optional
         As for `FlowRunner`.
     contact : str, optional
-        Name of the contact of a machine that is watched; the first unless given.
+        Name of the contact of a machine that is watched; by default the first.
 
     Raises
     ------
     NotAvailable
-        If the rig's motion is ill-posed, or pressed by a force prescribed in time.
+        If the rig's motion is ill-posed, or its normal stress is prescribed in time.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Flow(FlowRunner):
     def _rounding(self, value: float) -> float:
         """Error in the state, in natural sizes, that rounding of forces makes in steady sliding.
 
-        Forces are rounded as sums of far larger ones that balance; the state settles where what is left is zero.
+        Forces are small sums of far larger terms, so that rounding shifts the state at which they balance.
         """
         steady = self.steady(value)
         _, jacobian, _ = self.field(self.setting(value), steady[None])
@@ -82,7 +82,7 @@ class Flow(FlowRunner):
             return 0.0
 
     def setting(self, value: float) -> FlowSetting:
-        """The rig with the free parameter at a value.
+        """Kernel tables of the rig at a value of the free parameter (cached).
 
         Raises
         ------
@@ -92,11 +92,11 @@ class Flow(FlowRunner):
         if value not in self._settings:
             if len(self._settings) > 64:
                 self._settings.clear()
-            self._settings[value] = self._made(value)
+            self._settings[value] = self._build(value)
         return self._settings[value]
 
-    def _made(self, value: float) -> FlowSetting:
-        """Build the setting for a parameter value."""
+    def _build(self, value: float) -> FlowSetting:
+        """Kernel tables of the rig at a value of the free parameter, SI units."""
         if not self.domain.contains(value):
             raise Failure(f"{self.name} leaves its domain")
         point = self._varied(np.array([value]))
@@ -108,7 +108,7 @@ class Flow(FlowRunner):
         return self._set(point, np.array([drive, 0.0, 0.0]), value, unit, self._rates(value, unit))
 
     def _rates(self, value: float, unit: float) -> tuple[Array, Mapping[sp.Symbol, Array]]:
-        """Derivatives of constants and inputs in the parameter, per unit, by central differences."""
+        """Derivatives of constants and inputs in the parameter, per `unit`, by central differences."""
         beside = self._varied(value + DIFFERENCE * unit * np.array([1.0, -1.0]))
         found = self.sensitive.constants(beside)
         if len(found) == 1:
@@ -118,7 +118,7 @@ class Flow(FlowRunner):
         return rates[None, None], {V_LP: (drive[:1] - drive[1:])[None] / (2 * DIFFERENCE)}
 
     def _varied(self, around: Array) -> OperatingPoint:
-        """Operating point with the free parameter changed; short cut where nothing else depends on it."""
+        """Operating point at values `around` of the free parameter; faster where no other parameter depends on it."""
         if all(self.rig.value(other) is None for other in self.rig.replaces):
             named = self.base.point.named() | {self.name: around}
             return self.base.point.with_arguments(named.values(), np.shape(around))
@@ -135,7 +135,7 @@ class Flow(FlowRunner):
         return np.array([where[symbol] for symbol in self.reduction.state])
 
     def ahead(self, value: float, ways: float) -> Array:
-        """State after the load point has jumped back from steady sliding by `ways` natural sizes of slip."""
+        """State (n,) after the load point has jumped back from steady sliding by `ways` natural sizes of slip."""
         shifts = self.setting(value).point.evaluate(_shifts(self.reduction))
         found = self.steady(value)
         for i, shift in enumerate(shifts):

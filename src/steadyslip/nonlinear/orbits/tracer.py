@@ -23,16 +23,16 @@ from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 from steadyslip.nonlinear.orbits.special import SMALL, BranchPoint, changes, may_return
 
 LARGEST_STEP = 0.5  # largest step of arclength; unknowns are logarithms, so about a factor 1.6 of a state
-HALVINGS = 3  # halvings of a step in which a test function may vanish twice: down to 1/8, 1/16 of a natural size
+HALVINGS = 3  # halvings of a step in which a test function may vanish twice: to 1/8 of LARGEST_STEP, 0.06
 SMALLEST_STEP = 1e-9  # smallest step of arclength, the order of the Newton tolerance
 CREEP = 60  # steps in a row without growth, below 1e-3 of the largest, after which the branch counts as stuck
-SLOW_STEPS, SLOW, FASTER_AGAIN = 8, 0.2, 3.0  # slow: steps in a row below this share of the largest, growing less
+SLOW_STEPS, SLOW, FASTER_AGAIN = 8, 0.2, 3.0  # slow: 8 steps below 0.2 of LARGEST_STEP that grow by less than 3
 OF_RANGE = 3.0  # scale of a state variable, in units of its range in the cycle, after rescaling
 UNRESOLVED = 1e-7  # distance from 1 of a small cycle's multiplier below which it does not decide stability
-MOST_STEPS = 4_000_000  # integration steps for all pieces of a branch: two machines of the examples take three
+MOST_STEPS = 4_000_000  # integration steps for all pieces of a branch: two example machines take three million
 LOST = 1e-5  # error of the trivial multiplier beyond which more segments are tried
-LED = 30.0  # times as much of it where the motion leads the steps, still below `IMPRECISE`; then sensitivities do
-HIDDEN = 0.1  # largest share of rounding in a small cycle's distance from the edge
+LED = 30.0  # factor on LOST where sensitivities have loose tolerances (`FlowRunner.led`); still below `IMPRECISE`
+HIDDEN = 0.1  # largest share of rounding error in a small cycle's distance from the edge
 INTERRUPTED = "interrupted by the user"
 USED_UP = "the work was used up"
 
@@ -47,9 +47,9 @@ class Tracer:
     limits : tuple of float
         Range of the parameter.
     most : int
-        Limit of cycles on a piece.
+        Largest number of cycles on a piece.
     progress : callable, optional
-        Called with the number of cycles found on all pieces and the latest.
+        Called with the number of cycles found on all pieces and the latest cycle.
     """
 
     def __init__(
@@ -64,23 +64,23 @@ class Tracer:
         self.most_steps = self.last_step = MOST_STEPS
 
     def begin_branch(self) -> None:
-        """Allow the work of another branch, counted from here."""
+        """Allow `MOST_STEPS` further integration steps, for another branch."""
         self.last_step = self.flow.steps + MOST_STEPS
 
     def allot(self, parts: int) -> None:
-        """Limit the integration steps of the next piece to one of several equal parts of what is left for a branch."""
+        """Limit the integration steps of the next piece to 1/`parts` of those that the branch has left."""
         self.most_steps = self.flow.steps + max(0, self.last_step - self.flow.steps) // parts
 
     @property
     def is_spent(self) -> bool:
-        """True if the work of a branch is used up."""
+        """True if the branch has no integration steps left."""
         return self.flow.steps >= self.last_step
 
     def shooting(self, fractions: Array = ONE, amplitude: float = 1.0, scales: Array | None = None) -> Shooting:
         """Shooting equations for given segments (shares of the period) and a typical amplitude (natural sizes)."""
-        made = Shooting(self.flow, fractions, self.logarithmic, self.unit_of_value, scales)
-        made.amplitude = amplitude
-        return made
+        equations = Shooting(self.flow, fractions, self.logarithmic, self.unit_of_value, scales)
+        equations.amplitude = amplitude
+        return equations
 
     def unknown(self, value: float) -> float:
         """Convert a parameter value (SI units) to the last unknown of the shooting equations."""
@@ -94,7 +94,7 @@ class Tracer:
         Raises
         ------
         Failure
-            If there is none, or rounding hides how far from the edge it is.
+            If there is none, or its distance from the edge is mostly rounding error.
         """
         flow, onset = self.flow, self.onset
         setting = flow.setting(onset.value)
@@ -104,7 +104,7 @@ class Tracer:
         roots, vectors = np.linalg.eig(jacobian[0] * ratio)
         i = int(np.argmin(np.abs(roots - 1j * onset.angular_frequency)))
         vector = vectors[:, i] * flow.scales
-        # unit amplitude of v/v0 at the watched contact, in phase
+        # unit amplitude of v/v0 at the watched contact, real and positive
         size = setting.speed / 2 / (1j * onset.angular_frequency * complex(setting.slip @ vector))
         start = 2 * (size * vector).imag  # a quarter of a period before the peak
         shooting = self.shooting(amplitude=amplitude)
@@ -113,7 +113,7 @@ class Tracer:
         first = shooting.curve().start(shooting.packed(guess), tangent / np.linalg.norm(tangent))
         away = abs(onset.coefficient / onset.growth_slope) * amplitude**2 / self.unit_of_value
         if not onset.is_weak and first.rounding > HIDDEN * away:
-            raise Failure("its distance from the edge is lost in rounding")
+            raise Failure("the distance of the small cycle from the edge is lost in rounding")
         return shooting, first
 
     def doubled(self, cycle: Cycle, size: float) -> BranchPoint:
@@ -122,7 +122,7 @@ class Tracer:
         Raises
         ------
         Failure
-            If there is none, or it is the cycle itself, run through twice.
+            If there is none, or it is `cycle` itself, run through twice.
         """
         flow, (vector, pieces) = self.flow, self.deviation(cycle, -1.0)
         orbit = orbit_of(cycle)
@@ -131,7 +131,7 @@ class Tracer:
         for piece in (*pieces, *pieces[:-1]):
             aside.append(piece @ aside[-1])
         fractions = np.tile(orbit.fractions, 2) / 2
-        fractions[count - 1] += fractions[count]  # no cut in the middle: the motion is fast where cycles begin
+        fractions[count - 1] += fractions[count]  # no cut after the first turn: the motion is fast where cycles begin
         states = np.delete(np.tile(orbit.states, (2, 1)) + aside, count, axis=0)
         fractions = np.delete(fractions, count)
         shooting = self.shooting(fractions, scales=orbit.scales)
@@ -148,12 +148,13 @@ class Tracer:
     def deviation(self, cycle: Cycle, multiplier: complex) -> tuple[Array, Array]:
         """Eigenvector (n,) of one multiplier at a cycle's start, and the sensitivities of the segments (K, n, n).
 
-        It leaves slip at the load point's velocity, and is one unit of the unknowns large.
+        To first order the eigenvector leaves slip at the load point's velocity; its largest entry is 1 in units of the
+        shooting unknowns.
 
         Raises
         ------
         Failure
-            If the motion cannot be run through.
+            If the motion over a period cannot be integrated.
         """
         flow, orbit = self.flow, orbit_of(cycle)
         setting = flow.setting(cycle.value)
@@ -175,7 +176,7 @@ class Tracer:
         Raises
         ------
         Failure
-            If the orbit is not one.
+            If the shooting equations do not converge near the orbit.
         """
         shooting = self.shooting(orbit.fractions, amplitude, orbit.scales)
         u = shooting.packed(orbit)
@@ -193,14 +194,14 @@ class Tracer:
         self, shooting: Shooting, first: Point | BranchPoint, step: float, *, twice: bool = False,
         met: Callable[[BranchPoint], bool] | None = None,
     ) -> BranchPiece:  # fmt: skip
-        """Follow the cycles from a first one on, as far as possible.
+        """Piece of the branch from a first cycle to where it ends.
 
         Parameters
         ----------
         twice : bool
-            True for cycles of twice a period, which end where their period is halved.
+            True for a branch from a period doubling, which may end at another one.
         met : callable, optional
-            True for a cycle that is known already; the piece ends before it.
+            Returns True for a cycle that is known already; the piece ends before it.
         """
 
         def points() -> Iterator[tuple[BranchPoint, BranchPoint]]:
@@ -211,7 +212,7 @@ class Tracer:
         return self.gone_on(BranchPiece(rest=points(), twice=twice), met)
 
     def gone_on(self, piece: BranchPiece, met: Callable[[BranchPoint], bool] | None = None) -> BranchPiece:
-        """Go on with a piece that has a `rest`, until it ends or its part of the work is used up."""
+        """Extend a piece that has a `rest`, until it ends or its integration steps are used up."""
         points, begun = piece.rest or iter(()), self.flow.steps
         piece.rest, piece.end = None, ""
         try:
@@ -265,7 +266,7 @@ class Tracer:
         return piece
 
     def _add_changes(self, piece: BranchPiece, before: BranchPoint, here: BranchPoint) -> None:
-        """Append the bifurcations between two neighbouring cycles; of several, with a cycle between each two."""
+        """Append the bifurcations between two neighbouring cycles, and a cycle between each two bifurcations."""
         earlier = piece.points[-2] if len(piece.points) > 1 else before
         for one in self._changes(earlier, before, here, len(piece.points), HALVINGS):
             last = piece.special[-1] if piece.special else None
@@ -277,7 +278,7 @@ class Tracer:
     def _changes(
         self, earlier: BranchPoint, before: BranchPoint, here: BranchPoint, index: int, halvings: int
     ) -> list[SpecialCycle]:
-        """Bifurcations between two neighbouring cycles; halves the step where two of one kind may cancel."""
+        """Bifurcations between two neighbouring cycles; the step is halved where two of one kind may cancel."""
         found = changes(before, here, self.branch_point, index)
         if found or halvings == 0 or not may_return(earlier, before, here):
             return found
@@ -312,21 +313,21 @@ class Tracer:
             self.progress(self.count, known.cycle)
 
     def _points(self, here: BranchPoint, step: float) -> Iterator[tuple[BranchPoint, BranchPoint]]:
-        """Yield pairs of consecutive points of the piece, both in the same unknowns.
+        """Yield pairs of consecutive points of the piece, each pair in one set of unknowns.
 
-        Cycles are cut into segments anew where they are too unstable, where deviations grow and shrink again so much
-        within a segment that the trivial multiplier is lost, or where they cannot be followed any further. Where steps
-        stay small, states are measured by what they go through in a cycle (see `_rescaled`).
+        Cycles are cut into new segments where they are too unstable, where deviations grow and shrink so much within a
+        segment that the trivial multiplier is inaccurate, or where continuation fails. Where steps stay small, states
+        are scaled by their range in the cycle (see `_rescaled`).
         """
         limit, error, again, idle = MOST_GROWTH, self._lost, True, 0
         steps: list[float] = []
         while True:
-            made: dict[int, BranchPoint] = {}
+            found: dict[int, BranchPoint] = {}
             curve = self._curve(here)
 
-            def accept(point: Point, shooting: Shooting = here.shooting, made: dict[int, BranchPoint] = made) -> None:
-                made[0] = self.branch_point(shooting, point)
-                if made[0].cycle.amplitude > SHRUNK and self.ends.slows(made[0]):
+            def accept(point: Point, shooting: Shooting = here.shooting, found: dict[int, BranchPoint] = found) -> None:
+                found[0] = self.branch_point(shooting, point)
+                if found[0].cycle.amplitude > SHRUNK and self.ends.slows(found[0]):
                     raise Failure("the cycle begins where slip slows down")
 
             finer = None
@@ -336,7 +337,7 @@ class Tracer:
                     idle = idle + 1 if taken <= step and taken < 1e-3 * LARGEST_STEP else 0
                     if idle > CREEP:
                         raise Failure("steps stay tiny")
-                    before, here, step, again = here, made[0], taken, True
+                    before, here, step, again = here, found[0], taken, True
                     curve.tolerance = self._curve(here).tolerance
                     yield before, here
                     finer = self._begun_anew(here)
@@ -363,10 +364,10 @@ class Tracer:
                 here = finer
 
     def _rescaled(self, known: BranchPoint) -> BranchPoint | None:
-        """Restate a point with states measured by their range in the cycle; None if that changes the scales little.
+        """Point of the branch in unknowns scaled by the states' ranges in the cycle; None if scales change little.
 
-        Beside a body that sticks another may ring on and be anywhere in its small oscillation when slip begins, by
-        turns ahead and behind as the parameter changes. CycleData by natural sizes that makes the branch wriggle.
+        While one body sticks, another may ring, and the phase of that small oscillation at the onset of slip changes
+        with the parameter. In unknowns scaled by natural sizes this makes the branch wind.
         """
         shooting, count = known.shooting, self.flow.size
         scales = np.maximum(self.flow.scales, OF_RANGE * known.extent)
@@ -382,7 +383,7 @@ class Tracer:
             return None
 
     def _begun_anew(self, known: BranchPoint) -> BranchPoint | None:
-        """Restate a point with the start of the cycle at a steeper passage; None if there is none."""
+        """Point of the branch whose cycle starts at a steeper passage through the load point's velocity, or None."""
         if known.begin is None:
             return None
         direction = np.append(np.zeros(self.flow.size), known.point.tangent[-2:])
@@ -398,7 +399,7 @@ class Tracer:
         return curve
 
     def _finer(self, known: BranchPoint) -> BranchPoint | None:
-        """Restate a point with more shooting segments; None if more are of no use."""
+        """Point of the branch in more shooting segments; None if more do not help."""
         try:
             orbit = cut(known.shooting, known.point.u)
             if orbit is None:
@@ -409,12 +410,12 @@ class Tracer:
             return None
 
     def branch_point(self, shooting: Shooting, point: Point) -> BranchPoint:
-        """Derive the cycle and its properties from a solution of the shooting equations.
+        """Cycle with its properties, from a solution of the shooting equations.
 
         Raises
         ------
         Failure
-            If it is a shorter cycle, run through several times.
+            If the solution is a shorter cycle, run through several times.
         """
         orbit = shooting.orbit(point.u)
         away = np.abs(orbit.states - self.flow.steady(orbit.value)) / self.flow.scales
@@ -431,11 +432,11 @@ class Tracer:
 
     @property
     def _lost(self) -> float:
-        """Error of the trivial multiplier beyond which sensitivities are to be computed in another way."""
+        """Error of the trivial multiplier beyond which tolerances of the sensitivities are tightened."""
         return LOST * (LED if self.flow.slack == HARDLY_HEARD else 1.0)
 
     def _attracts(self, cycle: Cycle) -> bool:
-        """True if all multipliers lie inside the unit circle; where that is too close, decided by the kind of onset."""
+        """True if all multipliers lie inside the unit circle; small cycles too close to it follow the kind of onset."""
         if self.onset.is_weak and abs(cycle.growth - 1) < IMPRECISE:
             return False
         if cycle.amplitude < SMALL and abs(cycle.growth - 1) < max(UNRESOLVED, UNCERTAIN * cycle.multiplier_error):
@@ -443,7 +444,7 @@ class Tracer:
         return cycle.growth < 1
 
     def _at_limit(self, inside: BranchPoint, outside: BranchPoint) -> BranchPoint:
-        """Solve for the cycle at the limit of the parameter's range, between two neighbours."""
+        """Cycle at the limit of the parameter's range, between two neighbours; `outside` if it is not found."""
         low, high = self.limits
         try:
             return self.between(inside, outside, low if outside.cycle.value <= low else high)

@@ -112,7 +112,7 @@ def test_work_in_the_core_is_bounded_and_said(bristles, monkeypatch):
     assert found.stopped
     assert found.sentence.startswith("NOT DECIDED by ")
     less = " or rtol, or law = 'coulomb' with mu_static," if bristles else ""
-    assert f"the work was used up; a larger sample_time{less} takes less" in str(found)
+    assert f"the limit of steps was reached; a larger sample_time{less} takes fewer" in str(found)
 
 
 def held(text, **values):

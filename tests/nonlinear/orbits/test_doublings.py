@@ -267,13 +267,13 @@ def test_doublings_for_which_no_work_was_left_are_listed_apart(two_doublings, mo
     doubled = _branch(follower, further, None, 0)
     assert [len(piece.points) > 0 for piece in further] == [True, False, False]
     assert doubled.gaps == doubled.broken == ()
-    assert doubled.not_followed == tuple((piece.bounds[0], "the work was used up") for piece in further[1:])
+    assert doubled.not_followed == tuple((piece.bounds[0], "the limit of steps was reached") for piece in further[1:])
     told = replace(branch, doubled=doubled)
     places = [f"{end.value / 1e3:.6g} kN/m" for end, _ in doubled.not_followed]
-    assert f"not followed from the period doublings at {', '.join(places)}: the work was used up" in str(told)
+    assert f"not followed from the period doublings at {', '.join(places)}: the limit of steps was reached" in str(told)
     data = json.loads(json.dumps(told.to_dict()))["doubled"]["not_followed"]
     assert data == [
-        {"kind": "period doubling", "value": end.value, "why": "the work was used up"}
+        {"kind": "period doubling", "value": end.value, "why": "the limit of steps was reached"}
         for end, _ in doubled.not_followed
     ]
     drawn_places = [line for line in told.plot().lines if line.get_marker() == "+"]

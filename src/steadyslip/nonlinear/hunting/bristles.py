@@ -1,7 +1,7 @@
 """Contacts with memory (bristles) as a compiled routine, and the steps of Rodas5P that call it.
 
-The routine has friction forces, rates of the memories and the slopes of both, as functions of slip rates and memories.
-It depends on the kinds of the laws alone; their numbers are its constants.
+The routine computes friction forces, rates of the memories and the derivatives of both, from slip rates and memories.
+It is compiled once for each combination of laws; their parameters are constants in its tables.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from steadyslip.laws.friction import FrictionLaw
 from steadyslip.nonlinear.hunting.held_modes import HeldPiece
 from steadyslip.nonlinear.hunting.plant import Array, HeldContact, Plant
 
-SHORTEST = 1e-15  # s, of a step; far below the period of any bristle
-RATES, ALLOWED, FIXED = 0, 1, 2  # ways of `steadyslip.kernels.driver.bristles.bristle_step`
+SHORTEST = 1e-15  # shortest step, s; far below the period of any bristle
+RATES, ALLOWED, FIXED = 0, 1, 2  # last argument of `steadyslip.kernels.driver.bristles.bristle_step`
 
 
 class Bristles:
-    """Equations Y' = A Y + H f(G Y) of a plant, f friction forces and rates of memories, as arrays for the core.
+    """Equations Y' = A Y + H f(G Y) of a plant as arrays for the compiled core; f: friction forces and memory rates.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Bristles:
     rtol : float
         Error allowed per step, relative to the largest size of each variable so far.
     scale : ndarray (width,)
-        Least size of each variable.
+        Smallest size of each variable for error control.
 
     Attributes
     ----------
@@ -69,51 +69,51 @@ class Bristles:
             self.arrays = np.zeros(1), np.zeros((1, 1))
 
     def maps(self, piece: HeldPiece) -> tuple[Array, Array]:
-        """G and H in a mode; G has no rows where the motion is linear."""
+        """Matrices G (inputs, width) and H (width, outputs) in a mode; G has no rows where the motion is linear."""
         if piece not in self._maps:
             self._maps[piece] = _inputs(piece, [] if piece.linear else self._contacts), self._out_of
         return self._maps[piece]
 
 
 class BristleSteps(Bristles):
-    """Steps of Rodas5P for curved contacts; the length of a step is kept for the next piece."""
+    """Steps of Rodas5P for contacts with nonlinear friction; the last step length is the first of the next piece."""
 
     def begin(self, piece: HeldPiece, state: Array) -> None:
-        """Choose the first step, unless one has been taken."""
+        """Set the length of the first step, unless a step has been taken."""
         if np.isnan(self.clock[Held.LENGTH]):
             fastest = self.fastest(piece, state)  # 0 where no force presses a contact yet
             self.clock[Held.LENGTH] = 1.0 / fastest if fastest else np.inf
 
     def step(self, piece: HeldPiece, state: Array, most: float) -> tuple[float, Array]:
-        """Length of a step whose error is allowed, at most `most` (s), and its coefficients (5, width)."""
+        """Length of a step within the error tolerance, at most `most` (s), and its dense output (5, width)."""
         self.begin(piece, state)
         self.clock[Held.STOP] = most
         found, _, _ = self._called(piece, state, ALLOWED)
         return float(self.clock[Held.STOP]), found
 
     def noise(self, piece: HeldPiece, rows: Array, coefficients: Array, length: float) -> Array:
-        """Errors of the first three coefficients of rows, (rows, 3): of a guard that was just passed, its value."""
+        """Errors of the first three coefficients of guards, (rows, 3): only of the value, 0 at a guard just passed."""
         found = np.zeros((len(rows), 3))
         found[:, 0] = 1e-9 * np.abs(rows) @ np.abs(coefficients[0])
         return found
 
     def until(self, piece: HeldPiece, state: Array, coefficients: Array, length: float, share: float) -> Array:
-        """State at a share of a step, by a step to there: dense output is of lower order."""
+        """State (width,) at a share of a step, by a step of that length: dense output is of lower order."""
         if share == 0:
             return state
         self.clock[Held.STOP] = share * length
         return np.asarray(self._called(piece, state, FIXED)[0].sum(axis=0))
 
     def rate(self, piece: HeldPiece, state: Array) -> Array:
-        """Rates of all variables."""
+        """Time derivative (width,) of the state."""
         return self._called(piece, state, RATES)[1]
 
     def fastest(self, piece: HeldPiece, state: Array) -> float:
-        """Largest eigenvalue (1/s) of the motion."""
+        """Largest eigenvalue of the Jacobian at a state, absolute value, 1/s."""
         return float(np.max(np.abs(np.linalg.eigvals(self._called(piece, state, RATES)[2]))))
 
     def _called(self, piece: HeldPiece, state: Array, way: int) -> tuple[Array, Array, Array]:
-        """Dense output of a step from a state, rates and Jacobian there."""
+        """Dense output (5, width) of a step from a state, and rates (width,) and Jacobian at the state."""
         width = len(state)
         found, rates, jacobian = np.zeros((5, width)), np.zeros(width), np.zeros((width, width))
         if self.code.bristle_step(
@@ -127,7 +127,7 @@ TOO_SHORT = "the motion of the bristles cannot be followed: steps become too sho
 
 
 def _inputs(piece: HeldPiece, contacts: Sequence[HeldContact]) -> Array:
-    """G, (inputs, width): slip rate, then normal stress if a load presses and memory, or drag, of each contact."""
+    """G, (inputs, width): slip rate of each contact, then memory (and normal stress with a load), or else drag."""
     plant, found = piece.plant, []
     place = 2 * plant.size + 4
     for one in contacts:
@@ -145,7 +145,7 @@ def _inputs(piece: HeldPiece, contacts: Sequence[HeldContact]) -> Array:
 
 
 def _outputs(plant: Plant, contacts: Sequence[HeldContact]) -> Array:
-    """H, (width, outputs), for friction force and rates of the memory of each contact in turn."""
+    """H, (width, outputs): effect of friction force and memory rates of each contact on the rates of the state."""
     found, n, place, k = np.zeros((plant.width, plant.memory + len(contacts))), plant.size, 2 * plant.size + 4, 0
     for one in contacts:
         found[n : 2 * n, k] = -one.row / plant.inertia
@@ -159,7 +159,7 @@ def _outputs(plant: Plant, contacts: Sequence[HeldContact]) -> Array:
 
 @lru_cache(maxsize=1)
 def _tableau() -> Array:
-    """Coefficients of Rodas5P in the rows that `steadyslip.kernels.driver.bristles` expects."""
+    """Coefficients of Rodas5P as the table that `steadyslip.kernels.driver.bristles` expects (cached)."""
     method = rodas5p()
     rows = [*method.arguments(), *method.c, method.error, *method.dense, (method.gamma,)]
     return np.array([(*row, *(0.0,) * (method.stages - len(row))) for row in rows])
@@ -170,7 +170,7 @@ def _tableau() -> Array:
 
 @dataclass(frozen=True)
 class _Kinds:
-    """Laws, equal if they are of the same kind."""
+    """Cache key of a routine: equal for laws of equal kinds, whatever their parameters."""
 
     shapes: tuple[Any, ...]
     loaded: tuple[bool, ...]
@@ -183,9 +183,9 @@ def _routine(kinds: _Kinds) -> _Routine:
 
 
 class _Routine:
-    """Compiled routine of some laws, whatever their numbers; of loaded contacts normal stress is a variable.
+    """Compiled routine of friction laws; for contacts with a load (`loaded`) normal stress is a variable.
 
-    Without a law it is the viscous friction of a load: slip rate times drag.
+    None in place of a law is the viscous friction of a load: slip rate times drag.
     """
 
     def __init__(self, laws: Sequence[FrictionLaw | None], loaded: Sequence[bool]) -> None:
@@ -198,12 +198,12 @@ class _Routine:
                 groups.append([v, drag])
                 values.append([v * drag])
                 continue
-            names = _given(law)
-            area, sigma, *given = own = [
+            names = _own_names(law)
+            area, sigma, *values_of_law = own = [
                 inner_symbol(f"law{index}.{name}", real=True) for name in ("area", "sigma", *names)
             ]
             arguments += own
-            symbolic = with_values(law, dict(zip(names, given, strict=True)))
+            symbolic = with_values(law, dict(zip(names, values_of_law, strict=True)))
             v, *memory = (inner_symbol(f"bristle{index}.{k}", real=True) for k in range(1 + len(law.memory())))
             group = [v, *memory]
             if has_load:
@@ -227,16 +227,16 @@ class _Routine:
         self.code = code_of([program], layout, interpreting())
 
     def constants(self, contacts: Sequence[HeldContact]) -> Array:
-        """Constants of the routine for contacts with such laws."""
-        given: list[Any] = []
+        """Constants of the routine for contacts with the routine's laws."""
+        values: list[Any] = []
         for one in contacts:
             if not one.slow:
                 continue
             found = parameters(one.port.friction)
-            given += [one.port.area, one.normal, *(found[name].value for name in _given(one.port.friction))]
-        return np.array([float(value) for value in self._function(*given)] or [0.0])
+            values += [one.port.area, one.normal, *(found[name].value for name in _own_names(one.port.friction))]
+        return np.array([float(value) for value in self._function(*values)] or [0.0])
 
 
-def _given(law: FrictionLaw) -> list[str]:
-    """Names of the numbers that a law has."""
+def _own_names(law: FrictionLaw) -> list[str]:
+    """Names of the parameters of a law that have a value."""
     return [name for name, one in parameters(law).items() if one.value is not None]

@@ -1,7 +1,6 @@
-"""Whether a controller is unstable by itself, without any friction, and what to change.
+"""Test of a controller for instability without any friction, and changes of its gains that make it stable.
 
-Friction may hold what such a controller would move ever farther, so that neither a verdict on sliding nor a motion
-tells that friction is not to blame.
+Friction at rest may hide the instability: then neither the verdict on sliding nor a simulation shows its cause.
 """
 
 from __future__ import annotations
@@ -29,22 +28,22 @@ from steadyslip.model.numeric import has_response
 from steadyslip.nonlinear.hunting.held_modes import HeldMode, HeldPiece
 from steadyslip.nonlinear.hunting.plant import Array, Plant, free_plant
 
-GROWS = 1e-6  # real part of a root over its size, or of its step over 1, above the rounding of a double root at zero
+GROWS = 1e-6  # real part of a root over its size (sampled: size − 1) of growth; a double root at 0 has less by rounding
 NOTHING = 1e-12  # friction coefficient whose force is below rounding
-FACTOR, FACTORS = 2.0, 10  # by which gains and times are changed in turn, up to a thousand times each way
-FROM_ZERO = 1 / 32  # of the proportional gain over the size of a root: where a derivative gain of zero begins
-HALVINGS = 14  # of the last factor, to four digits
-MOST_LATE = 50  # samples in a dead time up to which the map of one sample is made: its size, and with it the work
-NAMED = 3  # changes that are told, the smallest ones
+FACTOR, FACTORS = 2.0, 10  # gains and times are changed by this factor up to ten times: a thousandfold either way
+FROM_ZERO = 1 / 32  # first value tried for a derivative gain of zero, over proportional gain divided by root size
+HALVINGS = 14  # bisections of the last factor, to four digits
+MOST_LATE = 50  # limit of samples in a dead time: the matrix of one sample grows with it
+NAMED = 3  # number of changes listed in the text, smallest first
 ALONE = "the controller is unstable without any friction: {what}; {remedy}"
-"""Clause on a controller that is unstable by itself; texts, documents and refusals say the same."""
+"""Clause on a controller that is unstable without friction, for all texts and messages."""
 
 
 def unstable_by_itself(rig: Slider | Machine) -> str:
-    """Clause on a controller that is unstable without any friction, as `ALONE`; empty for others, and without one.
+    """Clause `ALONE` on a controller that is unstable without any friction; empty for a stable or missing one.
 
-    Linear: limits, dead band and the step of an encoder are left out. With samples the roots are those of the map of
-    one sample.
+    Linear analysis: limits, dead band and encoder resolution are left out. For a sampled controller roots are those of
+    the matrix of one sample.
     """
     if has_response(rig) or not any(one.active and (one.stiffness or one.damping) for one in rig.mechanism().elements):
         return ""
@@ -70,26 +69,26 @@ def unstable_by_itself(rig: Slider | Machine) -> str:
 
 
 def growing_root(rig: Slider | Machine) -> complex | None:
-    """Root (1/s) of the loop of a controller without friction that grows fastest; None if none grows.
+    """Unstable root (1/s) of the control loop without friction with the largest growth rate; None if it is stable.
 
     Raises
     ------
     NotAvailable
-        If it is not known.
+        If the roots cannot be computed.
     """
     with np.errstate(all="ignore"), warnings.catch_warnings():
-        for kind in (IllPosedWarning, UndecidedWarning):  # on roots that are not a number, which are none here
+        for kind in (IllPosedWarning, UndecidedWarning):  # on roots that are NaN, which are ignored here
             warnings.simplefilter("ignore", kind)
         if _has_matrices(rig):
             plant = free_plant(rig)
             return _leading(plant) if plant.limits.sample_time is None else _leading_sampled(plant)
         free = without_friction(rig)
         roots = eigenvalues(free) if stability(free) == "unstable" else np.zeros(0)
-    return complex(roots[0]) if roots.size and np.isfinite(roots[0]) else None  # infinite without any inertia
+    return complex(roots[0]) if roots.size and np.isfinite(roots[0]) else None  # infinite for a rig without inertia
 
 
 def without_friction(rig: Slider | Machine) -> Any:
-    """The rig with a friction force far below rounding."""
+    """Copy of the rig with a friction force far below rounding."""
     law = weakest(NOTHING)
     if isinstance(rig, Slider):
         return replace(rig, friction=law)
@@ -104,7 +103,7 @@ def _has_matrices(rig: Slider | Machine) -> bool:
 
 
 def _linear(plant: Plant) -> Array:
-    """Matrix of places, speeds, integral and the force of a sampled controller, without limits."""
+    """Matrix of the linear system of positions, speeds, integral and force of a sampled controller, without limits."""
     limits = Limits(on_measurement=plant.limits.on_measurement, sample_time=plant.limits.sample_time)
     kept = [*range(2 * plant.size + 1), 2 * plant.size + 3]
     return HeldPiece(replace(plant, limits=limits), HeldMode(()), 0.0).matrix[np.ix_(kept, kept)]
@@ -124,15 +123,15 @@ def _leading_sampled(plant: Plant) -> complex | None:
 
 
 def sample_map(plant: Plant) -> Array:
-    """Matrix of one sample, of a controller without limits, dead band and encoder.
+    """Matrix of one sample of a controller without limits, dead band and encoder resolution.
 
-    It acts on places, speeds, integral, what each loop measured before, and the forces of the last samples that have
-    yet to act.
+    It maps positions, speeds, integral, the last measurement of each loop, and the forces of the last samples that are
+    delayed by the dead time.
 
     Raises
     ------
     NotAvailable
-        If its dead time is that of more than `MOST_LATE` samples.
+        If the dead time has more than `MOST_LATE` samples.
     """
     from scipy.linalg import expm  # not at start-up
 
@@ -144,8 +143,8 @@ def sample_map(plant: Plant) -> Array:
     n, period = plant.size, float(limits.sample_time or math.nan)
     late = int(plant.delay / period * (1 + 1e-12))
     if late > MOST_LATE:
-        raise NotAvailable(f"the loop is not judged with more than {MOST_LATE} samples in its dead time")
-    before = plant.delay - late * period  # of a period, until the next force acts
+        raise NotAvailable(f"stability of the loop is not computed with more than {MOST_LATE} samples in its dead time")
+    before = plant.delay - late * period  # time in a period (s) until the next force acts
     core = CompiledMotion(plant, Bristles(plant, 1.0, np.ones(plant.width)))
     matrix, loops = _linear(plant), len(plant.places)
     first, second = expm(before * matrix), expm((period - before) * matrix)
@@ -165,7 +164,7 @@ def sample_map(plant: Plant) -> Array:
 
 
 class _Move(NamedTuple):
-    """A change of a gain or time of a controller, by a factor in turn."""
+    """A gain or time of a controller, its present value (SI units), and the factor by which to change it repeatedly."""
 
     name: str
     own: float
@@ -173,7 +172,7 @@ class _Move(NamedTuple):
 
 
 def _moves(rig: Slider | Machine, root: complex) -> Iterator[_Move]:
-    """Changes of all gains and times, up and down; a derivative gain of zero rises from `FROM_ZERO`."""
+    """Yield changes of all gains and times, up and down; a derivative gain of zero starts at `FROM_ZERO`."""
     known = {name: one.value for name, one in rig.parameters().items() if name.startswith("drive.")}
     for name, value in known.items():
         own = float(value or 0.0)
@@ -187,14 +186,15 @@ def _moves(rig: Slider | Machine, root: complex) -> Iterator[_Move]:
             yield _Move(name, own, 1 / FACTOR)
 
 
-def _changes(rig: Slider | Machine, asked: Iterable[tuple[_Move, ...]]) -> Iterator[tuple[float, str]]:
-    """Size (in factors) and words of changes, together, that make the loop stable without friction."""
-    for moves in asked:
+def _changes(rig: Slider | Machine, candidates: Iterable[tuple[_Move, ...]]) -> Iterator[tuple[float, str]]:
+    """Yield size (power of the factors) and text of joint changes that make the loop stable without friction."""
+    for moves in candidates:
         if len({one.name for one in moves}) == len(moves) and (power := _least_power(rig, moves)) is not None:
-            yield power, " and ".join(_told(rig, one, power) for one in moves)
+            yield power, " and ".join(_bound(rig, one, power) for one in moves)
 
 
-def _told(rig: Slider | Machine, move: _Move, power: float) -> str:
+def _bound(rig: Slider | Machine, move: _Move, power: float) -> str:
+    """Format the bound of one changed parameter, as "drive.kp below 3 N/m"."""
     value = format_quantity(*rig.display_value(move.name, _moved(move, power)), area=rig.printed_area(move.name))
     return f"{move.name} {'above' if move.factor > 1 else 'below'} {value}"
 
@@ -204,7 +204,7 @@ def _moved(move: _Move, power: float) -> float:
 
 
 def _least_power(rig: Slider | Machine, moves: tuple[_Move, ...]) -> float | None:
-    """Least power of the factors with which the loop is stable; None without one."""
+    """Smallest power of the factors with which the loop is stable; None if there is none."""
 
     def stable(power: float) -> bool:
         with suppress(NotAvailable, ParameterError):

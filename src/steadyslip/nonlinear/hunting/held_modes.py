@@ -1,7 +1,7 @@
-"""Modes of a held rig: which contacts stick or slide, where the controller is limited; each a linear system.
+"""Modes of a held rig: which contacts stick or slide, which limits of the controller are reached.
 
-In a mode the motion is Y' = A Y (curved contacts besides) as long as every guard, a row on Y, is not
-negative; a guard that becomes so names the switch and its new position.
+In a mode the motion is Y' = A Y (plus nonlinear friction of curved contacts) as long as every guard, a row times Y, is
+not negative; the guard that becomes negative first determines the next mode by its `Switch`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from steadyslip.nonlinear.hunting.plant import Array, Load, Plant
 
 
 class Switch(NamedTuple):
-    """A change of mode: ``contact`` or ``load`` of some number, ``band``, ``clamp``, ``limit``, to its new position."""
+    """A change of mode: name of the field of `HeldMode` (singular), index of contact or load, and new position."""
 
     name: str
     number: int
@@ -26,18 +26,18 @@ class Switch(NamedTuple):
 
 @dataclass(frozen=True)
 class HeldMode:
-    """Positions of all switches.
+    """State of all contacts, loads and limits.
 
     Attributes
     ----------
     contacts : tuple of int
-        -1, 0, 1: sliding back, at rest, sliding forward.
+        For each contact -1, 0 or 1: sliding back, at rest, sliding forward.
     loads : tuple of int
-        -1, 1: sign of each load that presses a contact, of one contact after the other.
+        For each load of each contact in turn, its sign, -1 or 1.
     band : int
-        Side of the dead band on which the error is; 0 inside.
+        Side of the dead band on which the error is, -1 or 1; 0 inside.
     clamp, limit : int
-        Side at which the integral term, or the whole force, is at its limit; 0 if it is not.
+        Sign of the limit, -1 or 1, at which the integral term, or the whole force, is; 0 if within limits.
     """
 
     contacts: tuple[int, ...]
@@ -47,6 +47,7 @@ class HeldMode:
     limit: int = 0
 
     def switched(self, switch: Switch) -> HeldMode:
+        """The mode after a switch."""
         change: Any = {switch.name: switch.to}
         if switch.name in ("contact", "load"):
             every = f"{switch.name}s"
@@ -57,16 +58,16 @@ class HeldMode:
 
 
 class HeldPiece:
-    """Equations of a plant in one mode.
+    """Equations of a plant in one mode; "row" is an ndarray (width,) that gives a quantity as row times state Y.
 
     Parameters
     ----------
     plant : Plant
     mode : HeldMode
     acceleration : float
-        Of the target, m/s².
+        Acceleration of the target, m/s².
     least_load : float
-        Size of a load that presses a contact below which its sign does not matter.
+        Size of a load below which its sign is ignored, N or Pa.
     """
 
     def __init__(self, plant: Plant, mode: HeldMode, acceleration: float, least_load: float = 0.0) -> None:
@@ -75,13 +76,13 @@ class HeldPiece:
 
     @cached_property
     def linear(self) -> bool:
-        """True if the motion is Y' = A Y and nothing else: no bristles, and no slip under a load that makes drag."""
+        """True if the motion is Y' = A Y: no bristles, and no sliding with drag proportional to a load."""
         contacts = zip(self.plant.contacts, self.mode.contacts, strict=True)
         return not any(one.slow or (way and one.curved) for one, way in contacts)
 
     @cached_property
     def banded(self) -> Array:
-        """Row of the error that is integrated, without its dead band."""
+        """Row of the error that is integrated, reduced by the dead band."""
         band = self.plant.limits.dead_band
         if band is None:
             return self.plant.error()
@@ -116,13 +117,13 @@ class HeldPiece:
 
     @cached_property
     def pulls(self) -> tuple[tuple[Load, Array], ...]:
-        """Loads that press contacts, contact by contact, each with the row that gives its force from the state Y."""
+        """Loads of all contacts in turn, each with the row of its force."""
         loads = [load for contact in self.plant.contacts for load in contact.loads]
         return tuple((load, self.plant.passive(load) + load.controller * self.force) for load in loads)
 
     @cached_property
     def pressing(self) -> tuple[list[tuple[Load, Array]], ...]:
-        """For each contact, its loads, each with the row of the normal stress that it adds."""
+        """For each contact the list of its loads, each with the row of the normal stress that it adds."""
         sides = iter(zip(self.mode.loads, self.pulls, strict=True))
         found = []
         for contact in self.plant.contacts:
@@ -141,7 +142,7 @@ class HeldPiece:
         return sum((load.rest * row for load, row in self.pressing[index]), own)
 
     def drag(self, index: int) -> Array:
-        """Row of the friction force per slip rate that the loads of a sliding contact make; 0 at rest."""
+        """Row of the viscous coefficient (friction force per slip rate) from loads of a sliding contact; 0 at rest."""
         if not self.mode.contacts[index]:
             return np.zeros(self.plant.width)
         return sum((load.drag * row for load, row in self.pressing[index]), np.zeros(self.plant.width))
@@ -152,7 +153,7 @@ class HeldPiece:
 
     @cached_property
     def pushed(self) -> Array:
-        """Rows of the accelerations without the friction of contacts at rest, (coordinates, width)."""
+        """Rows (coordinates, width) of the accelerations without friction of contacts at rest."""
         plant, n = self.plant, self.plant.size
         rows = np.zeros((n, plant.width))
         rows[:, :n], rows[:, n : 2 * n] = -plant.stiffness, -plant.damping
@@ -167,7 +168,7 @@ class HeldPiece:
 
     @cached_property
     def resting(self) -> dict[int, Array]:
-        """Rows of the friction forces of contacts at rest, by number."""
+        """Rows of the friction forces of contacts at rest, by index of the contact."""
         plant = self.plant
         own = [i for i, (one, way) in enumerate(zip(plant.contacts, self.mode.contacts, strict=True))
                if not way and not one.slow]  # fmt: skip
@@ -180,14 +181,14 @@ class HeldPiece:
         matrix = rows @ (rows / plant.inertia).T
         if np.linalg.matrix_rank(matrix) < len(own):
             raise NotAvailable(
-                "the friction of contacts at rest is not determined: more of them than bodies between which they "
-                "slide; leave one out"
+                "the friction of contacts at rest is not determined, as there are more of them than bodies between "
+                "which they slide; leave one out"
             )
         return dict(zip(own, np.linalg.solve(matrix, carried), strict=True))
 
     @cached_property
     def matrix(self) -> Array:
-        """A, (width, width)."""
+        """Matrix A (width, width) of Y' = A Y."""
         plant, n = self.plant, self.plant.size
         found = np.zeros((plant.width, plant.width))
         found[:n, n : 2 * n] = np.eye(n)
@@ -202,12 +203,12 @@ class HeldPiece:
 
     @cached_property
     def fastest(self) -> float:
-        """Largest rate of the linear system (1/s)."""
+        """Largest absolute eigenvalue of the linear system, 1/s."""
         return float(np.max(np.abs(np.linalg.eigvals(self.matrix)), initial=0.0))
 
     @cached_property
     def guards(self) -> tuple[Array, tuple[Switch, ...]]:
-        """Rows that are not negative in this mode, (guards, width), and the switch that each one makes."""
+        """Rows (guards, width) whose values are not negative in this mode, and the switch of each."""
         found = [*self._of_contacts(), *self._of_loads(), *(self._of_controller() if not self.sampled else ())]
         rows = np.array([row for row, _ in found]) if found else np.zeros((0, self.plant.width))
         return rows, tuple(switch for _, switch in found)
@@ -217,7 +218,7 @@ class HeldPiece:
         found = []
         for i, (contact, way) in enumerate(zip(plant.contacts, self.mode.contacts, strict=True)):
             slip = plant.slip(contact)
-            if way:  # half the speed, so that a contact with memory does not switch to and fro
+            if way:  # bristles: at half the speed, so that the contact does not switch to and fro
                 found.append((way * slip - plant.row(one=0.5 * contact.slow), Switch("contact", i, 0)))
                 continue
             bound, row = (plant.row(one=contact.slow), slip) if contact.slow else (self.rest(i), self.resting[i])
@@ -225,7 +226,7 @@ class HeldPiece:
         return found
 
     def _of_loads(self) -> list[tuple[Array, Switch]]:
-        """Guards of the loads, a little beyond zero, so that one without any does not switch to and fro."""
+        """Guards of the signs of loads, offset by `least_load`, so that a zero load does not switch to and fro."""
         least = self.plant.row(one=self.least_load)
         return [(to * pull + least, Switch("load", i, -to))
                 for i, (to, (_, pull)) in enumerate(zip(self.mode.loads, self.pulls, strict=True))]  # fmt: skip
@@ -248,7 +249,7 @@ class HeldPiece:
 
 
 def _bounded(name: str, side: int, row: Array, bound: Array) -> list[tuple[Array, Switch]]:
-    """Guards of a value that is within a bound (side 0), or beyond it at a side."""
+    """Guards and switches of a value (`row`) that is within ±`bound` (side 0), or beyond it at `side`."""
     if side:
         return [(side * row - bound, Switch(name, 0, 0))]
     return [(bound - to * row, Switch(name, 0, to)) for to in (1, -1)]

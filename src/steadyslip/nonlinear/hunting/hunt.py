@@ -1,4 +1,4 @@
-"""`hunt`: run a rig that holds a place until it rests, repeats itself, or the time is over."""
+"""`hunt`: simulate a rig that holds a position until it rests, its strokes repeat, or the time ends."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from steadyslip.protocol.pieces import DisplacementStep
 from steadyslip.protocol.protocol import LOAD_POINT
 from steadyslip.protocol.segments import pack
 
-EXACT = 1e-9  # relative difference of two cycles that are one: what exact pieces are asked to agree to
-MOST_STROKES = 400  # after which the last ones are judged as they are; chosen by trial
-SAMPLED_STROKES = 24  # the same of a sampled controller, whose strokes differ by when in them it samples,
-MOST_SAMPLED_STROKES = 100  # unless they shrink: then more of them tell whether they go on to do so
-IN_CORE = 2_000_000  # steps of the compiled core at which it stops: some ten seconds
-MOST_STEPS = 50_000  # the same for steps outside it, with a contact that sticks or slides anew
-OFTEN = 0.02  # share of new strokes after which all are judged again: they may be thousands where a drive rings
-LONGEST = 1e9  # s, end of a motion that ends earlier by rest, repetition, strokes or steps
-CYCLES = 8  # largest number of strokes in a cycle that is looked for; usually there are two
-SHRINKING = 0.9  # ratio of later to earlier strokes below which they are told to shrink; chosen by trial
+EXACT = 1e-9  # relative difference within which cycles solved exactly count as equal
+MOST_STROKES = 400  # limit of strokes, after which the decision is made from the last ones; chosen by trial
+SAMPLED_STROKES = 24  # as MOST_STROKES, for a sampled controller, whose strokes vary with the phase of sampling
+MOST_SAMPLED_STROKES = 100  # as SAMPLED_STROKES, while strokes shrink
+IN_CORE = 2_000_000  # limit of steps of the compiled core: some ten seconds
+MOST_STEPS = 50_000  # limit of steps outside the compiled core, at switches of the mode
+OFTEN = 0.02  # share of new strokes after which repetition is tested again: a ringing drive makes thousands
+LONGEST = 1e9  # default end, s; the motion ends earlier by rest, repetition or the limits above
+CYCLES = 8  # largest number of strokes in a cycle that is looked for; usually it has two
+SHRINKING = 0.9  # ratio of later to earlier strokes below which they shrink; chosen by trial
 
 
 @checked(until=DURATION)
@@ -46,22 +46,22 @@ def hunt(
     rtol: float = 1e-8,
     progress: Callable[[float, int], None] | None = None,
 ) -> Hunt:
-    """Does an axis that is held (velocity 0) hunt about its target, or settle?
+    """Motion of an axis that is held (velocity 0), and the decision whether it hunts about its target or settles.
 
-    The motion begins at rest at place 0, where the target is as well, and then moves as the protocol says. Contacts
-    with Coulomb friction stick and slide, each piece a linear system that is solved exactly; those with bristles
-    (LuGre) are integrated, and viscous friction under a `transmitted` load while it slides.
+    Motion begins at rest at position 0, as does the target, which then moves by the protocol. Contacts with Coulomb
+    friction stick and slide; between switches the system is linear and solved exactly. It is integrated numerically
+    with bristles (LuGre), and with viscous friction under a `transmitted` load during sliding.
 
     Parameters
     ----------
     rig : Slider or Machine
-        With a controller at velocity 0.
+        Rig with a controller at velocity 0.
     protocol : Protocol, piece or list of pieces, optional
-        What moves the target. Without one it steps by twice the error that friction at rest can hold.
+        Motion of the target. By default it steps by twice the error that friction at rest can hold.
     until : float or str, optional
-        End of the motion (s). Without it, it ends where it rests, or a cycle repeats itself.
+        End of the motion (s). By default it ends when the axis rests or its strokes repeat.
     rtol : float
-        Error per step allowed where it is integrated.
+        Relative error allowed per step of numerical integration.
     progress : callable, optional
         Called with the time reached and the number of strokes.
 
@@ -72,9 +72,9 @@ def hunt(
     Raises
     ------
     ParameterError
-        If the drive does not hold a place, or the protocol acts on something else than the target.
+        If the drive does not hold a position, or the protocol acts on anything but the target.
     NotAvailable
-        If something has no mass, or a law or a dead time is not offered at rest.
+        If a coordinate has no inertia, or a friction law, contact law or dead time is not supported at rest.
 
     Examples
     --------
@@ -124,7 +124,7 @@ def hunt(
 
 
 def _enough(strokes: Sequence[Stroke], sampled: bool) -> bool:
-    """True if there are so many strokes that they are judged as they are."""
+    """True if the limit of strokes is reached, after which the decision is made from those there are."""
     if not sampled:
         return len(strokes) >= MOST_STROKES
     goes_on = len(strokes) >= SAMPLED_STROKES and _trend(strokes) is True
@@ -132,7 +132,7 @@ def _enough(strokes: Sequence[Stroke], sampled: bool) -> bool:
 
 
 def _target(protocol: Protocol) -> Protocol:
-    """The protocol, if it acts on the target alone, without waves."""
+    """The protocol; raises ParameterError unless it acts on the target alone, without waves."""
     problems = []
     for number, piece in enumerate(protocol.pieces, start=1):
         if piece.channel != LOAD_POINT or piece.frees_load_point or piece.wave() is not None:
@@ -161,11 +161,11 @@ def _usual_step(plant: Plant, unit: str) -> float:
             f"\"displacement-step at=0s by='1 {unit}'\""
         )
         raise ParameterError([Problem("protocol", message)])
-    return float(f"{step:.6g}")  # as people write it: how far exactly does not matter
+    return float(f"{step:.6g}")  # rounded for display: the exact size does not matter
 
 
 def cycle_length(strokes: Sequence[Stroke], close: float) -> int:
-    """Number of strokes after which the last ones repeat themselves to a relative error; 0 if they do not."""
+    """Number of strokes in a cycle, if the last two cycles agree to the relative error `close`; else 0."""
     done = [one for one in strokes if np.isfinite(one.end)]
     for count in range(1, CYCLES + 1):
         if len(done) < 2 * count + 1:
@@ -184,6 +184,7 @@ def _result(
     rig: Slider | Machine, protocol: Protocol, motion: Motion, at_rest: bool, errors: tuple[float, float],
     since: float,
 ) -> Hunt:  # fmt: skip
+    """Result of `hunt`; `errors`: tolerance of repetition and rtol, `since`: time (s) of the last change of target."""
     close, rtol = errors
     table, strokes = motion.table(), motion.trace.strokes
     own = swings(one for one in strokes if one.start >= since)
@@ -213,7 +214,7 @@ def _result(
     return Hunt(
         rig=rig, protocol=protocol, hunts=hunts, lowest=ratio * float(seen.min()), highest=ratio * float(seen.max()),
         period=float(period), repeats=bool(count), runs_away=bool(motion.runs_away),
-        strokes=tuple(_told(one, ratio) for one in strokes), time=table[:, 0], error=ratio * table[:, 1],
+        strokes=tuple(_at_reported_body(one, ratio) for one in strokes), time=table[:, 0], error=ratio * table[:, 1],
         velocity=ratio * table[:, 2], force=table[:, 3], exact=motion.exact, rtol=rtol, settled_at=float(settled),
         unit="rad" if turns else "m", force_unit=force, version=version(), scatter=ratio * scatter,
         others=() if motion.runs_away else swings_of(rig, late[:, 0], late[:, 4:]),
@@ -221,9 +222,9 @@ def _result(
 
 
 def _recent(strokes: Sequence[Stroke], count: int, shrinks: bool) -> Sequence[Stroke]:
-    """Strokes that are told: of a cycle of `count`, the last two that shrink, or the last third.
+    """Strokes that the result reports: the last two if they shrink, the last cycle of `count`, or the last third.
 
-    Where others are left, not the last one, after which the motion ended: its bristles and springs had no time to give.
+    The very last stroke is left out if there are others: the motion ended before its bristles and springs relaxed.
     """
     if shrinks or len(strokes) < 3:
         return strokes[-2:]
@@ -231,22 +232,22 @@ def _recent(strokes: Sequence[Stroke], count: int, shrinks: bool) -> Sequence[St
 
 
 def _scatter(strokes: Sequence[Stroke]) -> float:
-    """Largest difference between ends of strokes in one direction (m or rad)."""
+    """Largest difference (m or rad) between the ends of strokes in one direction."""
     ends = [[one.ends for one in strokes if (one.ends > one.begins) is way] for way in (True, False)]
     return max(float(np.ptp(own)) for own in ends if own)
 
 
-def _told(stroke: Stroke, ratio: float) -> Stroke:
-    """Stroke of the body by which the axis is told, which moves `ratio` times as far as the drive."""
+def _at_reported_body(stroke: Stroke, ratio: float) -> Stroke:
+    """Stroke of the body whose motion is reported, which moves `ratio` times as far as the drive."""
     ways = ("begins", "ends", "fastest", "lowest", "highest")
     return stroke if ratio == 1.0 else replace(stroke, **{name: ratio * getattr(stroke, name) for name in ways})
 
 
 def _trend(strokes: Sequence[Stroke]) -> bool | None:
-    """True if the later strokes reach as far as those before, False if they shrink to nothing.
+    """True if later strokes reach as far as earlier ones, False if they shrink to zero, None if undecided.
 
-    None of fewer than six, and of strokes that shrink towards a size of their own, as before a cycle: that is told by
-    the limit of a geometric sequence (Aitken's).
+    Undecided are fewer than six strokes, and strokes that shrink towards a finite size, as before a cycle: the limit is
+    extrapolated by Aitken's method.
     """
     if len(strokes) < 6:
         return None

@@ -1,4 +1,4 @@
-"""Result of `hunt`: whether a held axis hunts or settles, how far, how often, in numbers and words."""
+"""Result of `hunt`: decision whether a held axis hunts or settles, with size and period, in numbers and text."""
 
 from __future__ import annotations
 
@@ -18,52 +18,53 @@ from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.hunting.free_loop import unstable_by_itself
-from steadyslip.nonlinear.hunting.other_bodies import BodySwing, measured_body, other_bodies, told_body
+from steadyslip.nonlinear.hunting.other_bodies import BodySwing, measured_body, other_bodies, reported_body
 from steadyslip.nonlinear.hunting.plant import Array
 from steadyslip.nonlinear.hunting.stick_and_slip import STILL, Stroke, swings
 from steadyslip.protocol import Protocol
 
-SYMMETRIC = 1e-3  # relative difference of the two sides up to which they are written as one: four digits are printed
+SYMMETRIC = 1e-3  # relative difference of both sides below which one ± is printed: numbers have four digits
 
 
 @dataclass(frozen=True, eq=False)
 class Hunt(ReadOnly):
-    """Whether an axis that is held hunts about its target.
+    """Motion of a held axis, and whether it hunts about its target.
 
     Attributes
     ----------
     rig : Slider or Machine
     protocol : Protocol
-        Target, as it was moved.
+        Motion of the target.
     hunts : bool or None
-        True if strokes go on without becoming smaller, False if it settles; None if the motion ended before.
+        True if strokes go on without becoming smaller, False if the axis settles; None if the motion ended before.
     runs_away : bool
-        True if it goes ever farther from its target: the controller is unstable in sliding, or too weak for a load.
+        True if the error grows without limit: the controller is unstable in sliding, or too weak for a load.
     lowest, highest : float
-        Extremes of the measured place over the target (m or rad), in the last cycle, or from the last rest on; of a
-        machine of the drive, or of the body whose feed is given (`velocity_of`), as steady motion converts them.
+        Extremes of measured position less target (m or rad), in the last cycle, or since the last rest; for a machine
+        those of the drive, or of the body whose feed is given (`velocity_of`), converted as in steady motion.
     period : float
-        Duration of the cycle (s), with strokes to and fro; NaN if it does not repeat.
+        Duration of the cycle (s), of strokes both ways; NaN if strokes do not repeat.
     repeats : bool
-        True if the last cycle is that before, to 1e-9 (where it is integrated, to a hundred times `rtol`).
+        True if the last two cycles agree to 1e-9 (with numerical integration to a hundred times `rtol`).
     strokes : tuple of Stroke
-        Motions between two rests; `begins` and `ends` are errors (target less place).
+        Motions between two rests; `begins` and `ends` are errors (target less position).
     time, error, velocity, force : ndarray
         The motion: s; m or rad; m/s or rad/s; N, N m or Pa.
     exact : bool
-        True if every piece is solved exactly.
+        True if the motion is solved exactly between switches, False if integrated numerically.
     rtol : float
-        Error per step allowed where it is integrated.
+        Relative error allowed per step of numerical integration.
     settled_at : float
-        Time from which on it rests (s); NaN if it does not.
+        Time from which on the axis rests (s); NaN if it does not.
     unit, force_unit : str
     version : str
     scatter : float
-        How far the ends of strokes in one direction differ that `lowest` and `highest` are of (m or rad); 0 of a cycle.
+        Largest difference between ends of strokes in one direction (m or rad), among those of `lowest` and `highest`;
+        0 for a cycle.
     others : tuple of BodySwing
-        The same of other bodies with friction, each in its own motion; empty if it runs away.
+        Extremes of the other bodies with friction; empty if the axis runs away.
     stopped : bool
-        True if the motion was ended by the number of its steps.
+        True if the limit of steps ended the motion.
     """
 
     rig: Slider | Machine
@@ -95,17 +96,17 @@ class Hunt(ReadOnly):
 
     @property
     def fastest(self) -> float:
-        """Largest speed of the measured place in the last two strokes (m/s or rad/s); 0 without strokes."""
+        """Largest speed of the measured position in the last two strokes (m/s or rad/s); 0 without strokes."""
         return max((one.fastest for one in self._swings[-2:]), default=0.0)
 
     @property
     def every(self) -> float:
-        """Time from the start of the last but one stroke to that of the last (s), to and fro; NaN without two."""
+        """Time (s) between the starts of the last two strokes, in either direction; NaN with fewer than two."""
         return self._swings[-1].start - self._swings[-2].start if len(self._swings) > 1 else np.nan
 
     @property
     def sentence(self) -> str:
-        """Answer in a line, such as "HUNTS ±63.9 mm about the target every 24.4 s"."""
+        """Decision in a line, such as "HUNTS ±63.9 mm about the target every 24.4 s"."""
         far = max(abs(self.lowest), abs(self.highest))
         size = self._sizes(both=False)
         if self.runs_away:
@@ -122,7 +123,7 @@ class Hunt(ReadOnly):
         if self.hunts is None:
             return f"NOT DECIDED by {format_quantity(self._end, 's')}: {self._so_far}{self._of_late}"
         if np.isfinite(self.settled_at):
-            there = far <= 2 * STILL * np.max(np.abs(self.error), initial=0.0)  # the rest is when it was stopped
+            there = far <= 2 * STILL * np.max(np.abs(self.error), initial=0.0)  # within numerical errors
             where = f"on the target{self._beside}" if there else f"within {size} of the target"
             if not self.strokes and not there:
                 return f"DOES NOT MOVE: friction at rest holds it {size} from the target"
@@ -134,9 +135,9 @@ class Hunt(ReadOnly):
 
     @property
     def approached_at(self) -> float:
-        """Time (s) from which an axis that ends on its target is as near to it as in its last strokes.
+        """Time (s) from which an axis that ends on its target is as close to it as in its last strokes.
 
-        Infinite for one that does not end there within the digits of a run.
+        Infinite if the axis does not end on its target within numerical errors.
         """
         away = np.abs(self.error)
         if not len(away) or away[-1] > 2 * STILL * np.max(away):
@@ -147,7 +148,7 @@ class Hunt(ReadOnly):
     @property
     def at_body(self) -> str:
         """Name of the body of `error`, as " at motor"; empty for a rig with one body."""
-        return f" at {name}" if (name := told_body(self.rig)) else ""
+        return f" at {name}" if (name := reported_body(self.rig)) else ""
 
     @property
     def force_label(self) -> str:
@@ -155,9 +156,9 @@ class Hunt(ReadOnly):
         return "torque of the drive" if self.rig.drive.turns else "force of the drive"
 
     def _sizes(self, both: bool) -> str:
-        """How far the bodies are from their targets, to `both` sides or the larger of them, with their names."""
+        """Format the distances of all bodies from their targets, with names: on `both` sides, or the larger one."""
         own = self._size(self.lowest, self.highest, self.unit, both)
-        if not (name := told_body(self.rig)):
+        if not (name := reported_body(self.rig)):
             return own
         measured = measured_body(self.rig)
         seen = "" if measured == name else f" by the place of {measured}"
@@ -167,7 +168,7 @@ class Hunt(ReadOnly):
 
     @property
     def _beside(self) -> str:
-        """Bodies that rest off their targets where the one that is told is on its own; empty if there are none."""
+        """Format the bodies that rest off their targets while the reported one is on its own; empty without any."""
         ratios, way = other_bodies(self.rig), float(np.max(np.abs(self.error), initial=0.0)) / self.rig.feed()[0]
         off = [
             f"{self._size(one.lowest, one.highest, one.unit, False)} off it at {one.body}" for one in self.others
@@ -176,7 +177,7 @@ class Hunt(ReadOnly):
         return f"{self.at_body} ({', '.join(off)})" if off else ""
 
     def _size(self, low: float, high: float, unit: str, both: bool) -> str:
-        """One ± where both sides agree in the digits that are told, or as far as strokes of one side do."""
+        """Format a range about the target: one ± if both sides agree in the printed digits or within `scatter`."""
         far = max(abs(low), abs(high))
         if not both:
             return format_quantity(far, unit)
@@ -187,12 +188,12 @@ class Hunt(ReadOnly):
 
     @cached_property
     def unstable_loop(self) -> str:
-        """Clause on a controller that is unstable without any friction, with what to change; empty for others."""
+        """Clause on a controller that is unstable without any friction, with remedies; empty for a stable one."""
         return unstable_by_itself(self.rig)
 
     @property
     def _encoder(self) -> str:
-        """Step of an encoder elsewhere than where the drive acts, and by how much that moves; empty for others."""
+        """Format the step of an encoder at another body than the drive's, there and at the drive; empty for others."""
         drive: Any = self.rig.drive
         ratio = self.rig.seen()[0]
         step = getattr(drive, "resolution", None)
@@ -203,7 +204,7 @@ class Hunt(ReadOnly):
 
     @property
     def _so_far(self) -> str:
-        """What an axis has done by the end of its motion that neither rests nor hunts by then."""
+        """Describe the motion so far of an axis that neither rests nor hunts at its end."""
         own, now = self._swings, abs(float(self.error[-1])) if len(self.error) else 0.0
         off = f"is {format_quantity(now, self.unit)} from the target{self.at_body}"
         if not own:
@@ -216,7 +217,7 @@ class Hunt(ReadOnly):
 
     @property
     def _of_late(self) -> str:
-        """Range of places in the last third of the motion; empty where they are one place."""
+        """Format the range of positions in the last third of the motion; empty if it is one position."""
         places = -self.error[self.time >= self._end * 2 / 3]
         low, high = (format_quantity(float(end(places)), self.unit) for end in (np.min, np.max))
         return "" if low == high else f"; in the last third of this time from {low} to {high} of it"
@@ -241,26 +242,26 @@ class Hunt(ReadOnly):
             ends = (self.force.min(), self.force.max())
             low, high = (format_quantity(float(force), self.force_unit, area=self.rig.area) for force in ends)
             lines.append(f"controller      {low} to {high}")
-        if told := self._encoder:
-            lines.append(f"encoder         {told}")
+        if encoder := self._encoder:
+            lines.append(f"encoder         {encoder}")
         accuracy = "exact pieces" if self.exact else f"integrated to a relative error of {self.rtol:g}"
         lines.append(f"motion          {format_quantity(self._end, 's')} from rest, {accuracy}")
         if self.stopped:
             way = "a larger sample_time" if self.exact else "a larger sample_time or rtol"
             if any(one.friction.memory() for one in self.rig.mechanism().contacts):
                 way += ", or law = 'coulomb' with mu_static,"
-            lines.append(f"stopped there   the work was used up; {way} takes less")
+            lines.append(f"stopped there   the limit of steps was reached; {way} takes fewer")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
-        """Verdict and strokes as JSON-ready dict, SI units; None for what does not exist."""
+        """Decision and strokes as JSON-ready dict, SI units; missing values are null."""
         return {
             "hunts": self.hunts,
             "sentence": self.sentence,
             "unstable_loop": self.unstable_loop or None,
             "lowest": self.lowest,
             "highest": self.highest,
-            "body": told_body(self.rig) or None,
+            "body": reported_body(self.rig) or None,
             "others": [asdict(one) for one in self.others],
             "runs_away": self.runs_away,
             "period": _finite(self.period),
@@ -273,7 +274,7 @@ class Hunt(ReadOnly):
         }
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the motion, one row for each moment: time, error, speed and force of the drive; of an area in N.
+        """Write one row for each moment: time, error, speed, and force of the drive (N if the rig has an area).
 
         Raises
         ------

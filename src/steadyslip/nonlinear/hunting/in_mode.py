@@ -14,13 +14,13 @@ from steadyslip.nonlinear.hunting.held_modes import HeldPiece
 from steadyslip.nonlinear.hunting.plant import Array, Plant
 from steadyslip.nonlinear.hunting.steps import passage
 
-AT_ONCE = 4096  # steps between two looks at what has become of the motion: some ten milliseconds
-NONE = np.zeros((0, 2)), np.zeros((0, 0, 0))  # lengths and passages of a piece without
-FEW = 0.25  # radians of the fastest motion from one kept value to the next
+AT_ONCE = 4096  # steps of one call of the core: some ten milliseconds
+NONE = np.zeros((0, 2)), np.zeros((0, 0, 0))  # lengths and passages of a piece that has none yet
+FEW = 0.25  # phase of the fastest mode between two recorded values, rad
 
 
 class CompiledMotion:
-    """Motion of a plant while its mode stays, by `steadyslip.kernels.driver.holding`, and memory of its controller.
+    """Motion of a plant within one mode, by `steadyslip.kernels.driver.holding`, and the state of its controller.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class CompiledMotion:
         return int(self.clock[Held.STEPS])
 
     def follow(self, piece: HeldPiece, watched: Array, state: Array, fresh: bool) -> tuple[bool, Array]:
-        """Change the state up to `Held.END`, or until there is something to look at.
+        """Advance the state (in place) to `Held.END`, or until the mode may change or `AT_ONCE` steps are taken.
 
         Parameters
         ----------
@@ -76,14 +76,14 @@ class CompiledMotion:
             Rows of error, speed and force, and of errors of other bodies.
         state : ndarray (width,)
         fresh : bool
-            True if only the sample that is due shall be taken.
+            True to take only the sample that is due.
 
         Returns
         -------
         bool
             True if the mode may change before `Held.STOP`: the end, or the next sample or change of force.
         ndarray (times, 1 + values)
-            Time and these values on the way.
+            Recorded times (s) and values of `watched`.
         """
         clock, bristles = self.clock, self.bristles
         guards, _ = piece.guards
@@ -105,7 +105,7 @@ class CompiledMotion:
         return turn == Turn.STEP, rows[: int(clock[Held.ROWS])]
 
     def _every(self, piece: HeldPiece) -> int:
-        """Nodes of a step from one kept value to the next: a force that stays needs only its ends."""
+        """Number of nodes of a step between two recorded values; all, if a constant force needs only the ends."""
         if self.clock[Held.RESTS]:
             return NODES - 1
         if not (piece.linear and self.period):
@@ -114,7 +114,7 @@ class CompiledMotion:
         return (NODES - 1) // (1 if turned <= FEW else 2 if turned <= 2 * FEW else 4)
 
     def _add(self, piece: HeldPiece, watched: Array, length: float) -> None:
-        """Add the passage over a time (s)."""
+        """Compute the passage matrix for steps of a given length (s), and store it for the piece."""
         lengths, passages = self.passages.get(piece, NONE)
         parts = max(1, math.ceil(piece.fastest * length))
         found = passage(piece, watched, length / parts)

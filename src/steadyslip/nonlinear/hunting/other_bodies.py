@@ -1,4 +1,4 @@
-"""Bodies of a held machine besides that by which it is told: how far they are from their targets."""
+"""Distances from their targets of the bodies of a held machine other than the reported one."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from steadyslip.nonlinear.hunting.plant import Array, Plant
 
 @dataclass(frozen=True)
 class BodySwing(Displayed):
-    """How far another body with friction is over its target, that of the drive as steady motion converts it.
+    """Extremes of position less target of a body with friction; its target is the drive's, as in steady motion.
 
     Attributes
     ----------
     body : str
     lowest, highest : float
-        Extremes of its place over its target in the same time as those of the answer; m or rad.
+        Extremes of position less target, over the time of `Hunt.lowest`; m or rad.
     unit : str
     """
 
@@ -31,21 +31,21 @@ class BodySwing(Displayed):
     unit: str
 
 
-def told_body(rig: Slider | Machine) -> str:
-    """Body of a machine by which a held place is told: whose feed is given, or that of the drive; of several only."""
+def reported_body(rig: Slider | Machine) -> str:
+    """Body whose position `Hunt` reports: that whose feed is given, or the drive's; empty for a rig with one body."""
     if not isinstance(rig, Machine) or len(rig.bodies) < 2:
         return ""
     return rig.fed or rig.drive.driven() or ""
 
 
 def measured_body(rig: Slider | Machine) -> str:
-    """Body of a machine whose place the controller measures; empty for a rig with one body."""
-    return rig.drive.watched()[0] if told_body(rig) and isinstance(rig, Machine) else ""
+    """Body of a machine whose position the controller measures; empty for a rig with one body."""
+    return rig.drive.watched()[0] if reported_body(rig) and isinstance(rig, Machine) else ""
 
 
 def other_bodies(rig: Slider | Machine) -> dict[str, float]:
-    """Bodies with contacts besides the one that is told by its own place, and their motion for one of the drive."""
-    own = told_body(rig)
+    """Bodies with contacts, with their motion per motion of the drive; without a reported body that is measured."""
+    own = reported_body(rig)
     if not own or not isinstance(rig, Machine):
         return {}
     speeds, measured = rig.ratios(), measured_body(rig)
@@ -54,7 +54,7 @@ def other_bodies(rig: Slider | Machine) -> dict[str, float]:
 
 
 def rows_of(rig: Slider | Machine, plant: Plant) -> list[Array]:
-    """Rows of the errors of the other bodies, target less place."""
+    """Rows (width,) that give the errors (target less position) of the other bodies from the state of a plant."""
     names = [one.name for one in rig.mechanism().coordinates]
     return [
         plant.row(-np.eye(plant.size)[names.index(body)], target=ratio) for body, ratio in other_bodies(rig).items()
@@ -62,7 +62,7 @@ def rows_of(rig: Slider | Machine, plant: Plant) -> list[Array]:
 
 
 def swings_of(rig: Slider | Machine, times: Array, errors: Array) -> tuple[BodySwing, ...]:
-    """Swings of the other bodies from their errors (times, bodies) at some times (s)."""
+    """Extremes of the other bodies, from their errors (times, bodies) at times (s)."""
     if not len(times):
         return ()
     return tuple(
@@ -72,7 +72,7 @@ def swings_of(rig: Slider | Machine, times: Array, errors: Array) -> tuple[BodyS
 
 
 def _largest(times: Array, values: Sequence[float] | Array) -> float:
-    """Largest of the values of a smooth function, by a parabola through it and its neighbours."""
+    """Maximum of a smooth function from values at times, by a parabola through the largest and its neighbours."""
     i = int(np.argmax(values))
     if not 0 < i < len(values) - 1:
         return float(values[i])

@@ -1,7 +1,7 @@
-"""Matrices of a rig whose drive holds a place: inertia, springs, controller and contacts, as numbers.
+"""Matrices of a rig whose drive holds a position: inertia, springs, controller and contacts, as numbers.
 
-The state is Y = [q, w, I, r, r', u, z, 1]: places and velocities of the coordinates, the integral of the error, the
-target and its velocity, the force of a sampled controller, the memory of the contacts, and a constant. Rows act on it.
+The state is Y = [q, w, I, r, r', u, z, 1]: positions and velocities of the coordinates, integral of the error, target
+and its velocity, force of a sampled controller, memory of the contacts, 1. A row (width,) gives a quantity as row·Y.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """Pull T that presses a contact besides its preload: its normal stress grows by `forward` T, or −`back` T, T < 0.
+    """Pull T that adds to a contact's preload: normal stress grows by `forward` T for T > 0, by −`back` T for T < 0.
 
     Attributes
     ----------
     places, speeds : ndarray (coordinates + 1,)
-        Shares of the coordinates, and of the target as the last one, in T.
+        T per position and per velocity of each coordinate, and of the target (last).
     controller : float
-        Share of the controller's force.
+        T per force of the controller.
     forward, back : float
-        Shares of T > 0 and of T < 0.
+        Normal stress per T for T > 0, and per −T for T < 0.
     rest, coulomb, drag : float
-        Friction force at rest, and in sliding its constant part and that per slip rate, all per normal stress; 0 for a
-        law with memory.
+        Largest friction force at rest, and in sliding its constant part and that per slip rate, per normal stress; 0
+        for a law with memory.
     """
 
     places: Array
@@ -53,19 +53,20 @@ class Load:
 
 @dataclass(frozen=True, eq=False)
 class HeldContact:
-    """A contact: force −`row`·F with F = `coulomb` sign(v) + `drag` v, v = `row`·w − `belt` r', without its loads.
+    """A contact: forces −`row` F with F = `coulomb` sign(v) + `drag` v and v = `row`·w − `belt` r', without loads.
 
     Attributes
     ----------
     row : ndarray (coordinates,)
+        Share of each coordinate's velocity in the slip rate.
     belt : float
         Share of the target's velocity in the slip rate.
     rest : float
         Largest friction force at rest (N, or Pa).
     coulomb, drag : float
-        Of sliding friction; 0 for a law with memory.
+        Constant part of sliding friction, and that per slip rate; 0 for a law with memory.
     port : ContactPort
-        Law of friction, of a contact that is not linear in sliding.
+        The contact in the mechanism, with its friction law.
     normal : float
         Normal stress (Pa), or force, without its loads.
     slow : float
@@ -85,7 +86,7 @@ class HeldContact:
 
     @property
     def curved(self) -> bool:
-        """True if its friction is no linear function of the state: of bristles, or of a slip rate times a load."""
+        """True if friction is a nonlinear function of the state: bristles, or drag proportional to a load."""
         return bool(self.slow) or any(load.drag for load in self.loads)
 
 
@@ -122,14 +123,14 @@ class Plant:
 
     @property
     def bands_rate(self) -> bool:
-        """True if the dead band acts on the derivative as well: of the error, not of the speed loop of a cascade."""
+        """True if the dead band acts on the derivative of the error too; not for the speed loop of a cascade."""
         limits = self.limits
         return (
             limits.dead_band is not None and not (limits.of_integral or limits.on_measurement) and len(self.gains) == 1
         )
 
     def row(self, place: Array | None = None, velocity: Array | None = None, **others: float) -> Array:
-        """Row over Y; `others` are ``integral``, ``target``, ``target_velocity``, ``held`` and ``one``."""
+        """Row (width,) of its parts; `others` are ``integral``, ``target``, ``target_velocity``, ``held``, ``one``."""
         n = self.size
         found = np.zeros(self.width)
         if place is not None:
@@ -142,15 +143,15 @@ class Plant:
         return found
 
     def error(self, loop: int = 0) -> Array:
-        """Row of the error that a loop of the controller sees.
+        """Row of the error of one loop of the controller.
 
-        That of a speed loop is the integral of its own, without the target where derivatives are of the measurement.
+        For a speed loop that is the integral of its error, without the target if derivatives are of the measurement.
         """
         kicked = loop == 0 or not self.limits.on_measurement
         return self.row(-self.places[loop], target=1.0 if kicked else 0.0)
 
     def error_rate(self, loop: int = 0) -> Array:
-        """Row of its derivative, of the measured place alone where the limits say so."""
+        """Row of the derivative of `error`, or of the measured position alone with `limits.on_measurement`."""
         return self.row(None, -self.places[loop], target_velocity=0.0 if self.limits.on_measurement else 1.0)
 
     def passive(self, load: Load) -> Array:
@@ -163,12 +164,12 @@ class Plant:
 
 
 def plant_of(rig: Slider | Machine) -> Plant:
-    """Matrices of a rig that holds a place.
+    """Matrices of a rig that holds a position.
 
     Raises
     ------
     NotAvailable
-        If a coordinate has no inertia, or a law of contact or friction is not offered at rest.
+        If a coordinate has no inertia, or a contact or friction law is not supported at rest.
     """
     mechanism = rig.mechanism()
     names = [one.name for one in mechanism.coordinates]
@@ -211,13 +212,13 @@ def free_plant(rig: Slider | Machine) -> Plant:
 
 
 def _row(shares: Mapping[str, Any], names: list[str], target: bool = False) -> Array:
-    """Shares as a row over the coordinates, with that of the load point as its last element if `target`."""
+    """Shares as array over the coordinates, with that of the load point as last element if `target`."""
     found = [float(shares.get(name, 0)) for name in names]
     return np.array([*found, float(shares.get(LOAD_POINT, 0))] if target else found)
 
 
 def _controller(mechanism: Mechanism, names: list[str]) -> dict[str, Any]:
-    """Fields of `Plant` about the controller; a loop has an error of its own and a gain on it and on its derivative."""
+    """Fields of `Plant` for the controller; each of its loops has an error, and gains on error and derivative."""
     active = [one for one in mechanism.elements if one.active]
     integral = mechanism.integral
     return {
@@ -231,6 +232,7 @@ def _controller(mechanism: Mechanism, names: list[str]) -> dict[str, Any]:
 
 
 def _contact(mechanism: Mechanism, port: ContactPort, names: list[str]) -> HeldContact:
+    """Contact of a plant; raises NotAvailable if its laws are not supported at rest."""
     label = f"contacts.{port.name}." if port.name else ""
     law, contact = port.friction, port.contact
     time = sp.Symbol("t")
@@ -248,7 +250,7 @@ def _contact(mechanism: Mechanism, port: ContactPort, names: list[str]) -> HeldC
     if law.memory() and slow is not None:
         return HeldContact(row, belt, 0.0, 0.0, 0.0, port, sigma, float(slow), loads)
     v = sp.Symbol("v", positive=True)
-    sliding = sp.sympify(law.strength(v, 1, (), sp.nan))  # friction without memory is in proportion to normal stress
+    sliding = sp.sympify(law.strength(v, 1, (), sp.nan))  # friction without memory is proportional to normal stress
     if sliding.diff(v, 2) != 0:
         raise NotAvailable(NOT_AT_REST.format(label, law.name))
     rest, coulomb, drag = (
@@ -262,7 +264,7 @@ NOT_AT_REST = "{}friction: the law {!r} is not offered at rest; allowed: coulomb
 
 
 def _pull_shares(contact: ContactLaw) -> tuple[float, float] | None:
-    """Shares of T > 0, and of −T where T < 0, that press a contact besides its preload; None of other laws."""
+    """Normal stress per T > 0, and per −T for T < 0, that a contact law adds; None unless it is piecewise linear."""
     letters: dict[str, Any] = {one.name: sp.Symbol(one.name) for one in fields(ContactInputs)}
     pull = sp.Symbol("pull", real=True)
     coupling = sp.sympify(contact.coupling(ContactInputs(**letters | {"spring": pull})))
@@ -273,7 +275,7 @@ def _pull_shares(contact: ContactLaw) -> tuple[float, float] | None:
 
 
 def _load(mechanism: Mechanism, port: ContactPort, shares: tuple[float, float], names: list[str]) -> Load:
-    """Pull T of a contact as `steadyslip.model.forces` defines it."""
+    """The pull T of a contact, as defined in `steadyslip.model.forces`."""
     body, pulling = next(name for name in port.slip if name != LOAD_POINT), mechanism.pulling(port)
     if port.loaded_by:
         body = next(name for name in port.slip if name in pulling[0].acts)
@@ -291,7 +293,7 @@ def _load(mechanism: Mechanism, port: ContactPort, shares: tuple[float, float], 
 
 
 def _merged(contacts: list[HeldContact]) -> tuple[HeldContact, ...]:
-    """Contacts without memory that slide in proportion, joined: where they stick, only their sum is determined."""
+    """Contacts, with those joined that have no memory and proportional slip rates: at rest only their sum is known."""
     found: list[HeldContact] = []
     for one in contacts:
         for i, other in enumerate(found):
@@ -315,7 +317,7 @@ def _merged(contacts: list[HeldContact]) -> tuple[HeldContact, ...]:
 
 
 def _check_forces_at_rest(plant: Plant) -> None:
-    """Refuse contacts at rest that would have to balance friction which is no linear function of the state."""
+    """Raise NotAvailable if a contact at rest would have to balance nonlinear friction of another."""
     for one, other in itertools.permutations(plant.contacts, 2):
         if not one.slow and other.curved and one.row @ (other.row / plant.inertia):
             at_rest, moves = (f"contacts.{contact.port.name}" for contact in (one, other))

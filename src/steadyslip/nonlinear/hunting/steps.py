@@ -1,6 +1,6 @@
-"""Steps of a linear piece as polynomials in the fraction of the step, and the first guard that fails on one.
+"""Steps of a linear piece as polynomials in the fraction of the step, and the first guard that becomes negative.
 
-Without memory a mode is a linear system, and its step the Taylor series of the exact solution, to rounding.
+Without memory a mode is a linear system, and a step is the Taylor series of the exact solution, to rounding.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from steadyslip.kernels.driver import holding
 from steadyslip.nonlinear.hunting.held_modes import HeldPiece
 from steadyslip.nonlinear.hunting.plant import Array
 
-DEGREE = 22  # of the Taylor series: 1/22! is 1e-21, for steps of one over the largest eigenvalue
+DEGREE = 22  # degree of the Taylor series: 1/22! is 1e-21, and steps are at most one over the largest eigenvalue
 ROUNDING = 1e-13  # relative error of the first coefficients of a guard: some hundred roundings
-NODES = np.linspace(0.0, 1.0, holding.NODES)  # fractions of a step where guards are looked at
+NODES = np.linspace(0.0, 1.0, holding.NODES)  # fractions of a step at which guards are evaluated
 POWERS = NODES ** np.arange(DEGREE + 1)[:, None]
 
 
@@ -47,38 +47,38 @@ class ExactSteps:
             length *= 0.5
 
     def noise(self, piece: HeldPiece, rows: Array, coefficients: Array, length: float) -> Array:
-        """Rounding errors of the first three coefficients of rows, (rows, 3)."""
+        """Rounding errors (rows, 3) of the first three coefficients of the quantities given by `rows`."""
         size, matrix = np.abs(coefficients[0]), np.abs(piece.matrix)
         sizes = [size, matrix @ size * length, matrix @ (matrix @ size) * (length**2 / 2)]
         return np.asarray(ROUNDING * np.abs(rows) @ np.transpose(sizes))
 
     def until(self, piece: HeldPiece, state: Array, coefficients: Array, length: float, share: float) -> Array:
-        """State at a share of a step."""
+        """State (width,) at a share of a step."""
         return np.asarray(share ** np.arange(DEGREE + 1) @ coefficients)
 
     def rate(self, piece: HeldPiece, state: Array) -> Array:
-        """Rates of all variables."""
+        """Time derivative (width,) of the state."""
         return np.asarray(piece.matrix @ state)
 
     def fastest(self, piece: HeldPiece, state: Array) -> float:
-        """Largest eigenvalue (1/s) of the motion."""
+        """Largest absolute eigenvalue, 1/s."""
         return piece.fastest
 
 
 def passage(piece: HeldPiece, watched: Array, length: float) -> Array:
-    """Exact motion of a linear piece over a fixed time (s), at most one over the fastest rate, as one matrix.
+    """Matrix of the exact motion of a linear piece over a fixed time (s), at most one over the fastest rate.
 
     Parameters
     ----------
     piece : HeldPiece
     watched : ndarray (values, width)
-        Rows whose values at `NODES` are wanted.
+        Rows of quantities to be recorded at `NODES`.
     length : float
 
     Returns
     -------
     ndarray (rows, width)
-        Rows of the state at the end, of the guards' coefficients in turn, and of the values.
+        Times the state at the start: the state at the end, coefficients of each guard in turn, values of `watched`.
     """
     rows, _ = piece.guards
     width, powers = len(piece.matrix), series(piece, length)
@@ -93,10 +93,11 @@ def first_crossing(guards: Array, fresh: Array, noise: Array) -> tuple[float, in
     Parameters
     ----------
     guards : ndarray (guards, degree + 1)
-        Coefficients; those of fresh guards lose what is below the noise.
+        Polynomial coefficients; leading ones of fresh guards that are below the noise are set to 0 (in place).
     fresh : ndarray of bool (guards,)
-        Guards that were just switched to, whose first values are 0 but for rounding.
+        Guards of the last switch, whose first values are 0 but for rounding.
     noise : ndarray (guards, 3)
+        Errors of the first three coefficients.
     """
     guards[:, :3][fresh[:, None] & (np.cumsum(np.abs(guards[:, :3]) > noise, axis=1) == 0)] = 0.0
     leading = guards[np.arange(len(guards)), np.argmax(guards != 0, axis=1)]
@@ -108,13 +109,13 @@ def first_crossing(guards: Array, fresh: Array, noise: Array) -> tuple[float, in
 
 
 def _root(guard: Array) -> float | None:
-    """First share of a step at which a guard that is not negative at first becomes so; None if there is none."""
+    """First share of a step at which a guard becomes negative that was not at its start; None if there is none."""
     from scipy.optimize import brentq, minimize_scalar  # not at start-up
 
     values = guard @ POWERS[: len(guard)]
     polynomial = np.polynomial.Polynomial(guard)
     skip = int(np.argmax(guard != 0)) if np.any(guard) else 0
-    rest = np.polynomial.Polynomial(guard[skip:])  # without the root at 0 of a fresh guard
+    rest = np.polynomial.Polynomial(guard[skip:])  # without the root at 0 that a fresh guard has
     dips = (values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:]) & (values[1:-1] > 0)
     bend = values[2:] + values[:-2] - 2 * values[1:-1]
     least = values[1:-1] - (values[2:] - values[:-2]) ** 2 / (8 * np.where(bend > 0, bend, np.inf))

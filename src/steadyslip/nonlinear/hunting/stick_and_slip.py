@@ -1,4 +1,4 @@
-"""Motion of a held rig from mode to mode, sample to sample, and its strokes."""
+"""Motion of a held rig from mode to mode and from sample to sample, and its strokes."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from steadyslip.nonlinear.hunting.steps import NODES, POWERS, ExactSteps, first_
 from steadyslip.protocol.segments import Segments
 
 BEYOND = 1e-12  # relative excess of a force over friction at rest that is rounding
-STILL_ERROR = 0.1  # of the error allowed per step, below which the speeds of bristles are noise (by trial)
-STILL = 1e-9  # of the fastest speed so far, below which what is at rest moves no more
-AT_ONCE = 100  # switches without time passing that are no sequence of switches any more
-AWAY = 1e4  # error over what friction, load or target account for, beyond which friction is negligible
-KEPT = slice(0, None, 8)  # of the nodes of a step, those whose values are kept
+STILL_ERROR = 0.1  # factor on rtol: relative speeds of bristles below it are noise (by trial)
+STILL = 1e-9  # speed over the fastest so far, below which a body counts as at rest
+AT_ONCE = 100  # limit of switches without time passing; more do not come to an end
+AWAY = 1e4  # error over that which friction, load or target explain, beyond which friction is negligible
+KEPT = slice(0, None, 8)  # nodes of a step at which values are recorded
 
 
-LEAST_LOAD = 1e-13  # of the largest load, below which its sign does not matter: rounding of the friction it causes
-RINGING = 0.1  # of the longest stroke of the later half: what sheds less is no event of a simulation either
+LEAST_LOAD = 1e-13  # share of the largest load below which its sign is ignored: rounding of the friction it causes
+RINGING = 0.1  # share of the longest stroke of the later half below which a stroke is ringing, as for slip events
 
 
 @dataclass
 class Stroke:
-    """Motion between two rests: when (s), from where to where (error, m or rad), and its extremes."""
+    """Motion between two rests: start and end (s), errors there (m or rad), and extremes of error and speed."""
 
     start: float
     begins: float
@@ -42,9 +42,9 @@ class Stroke:
 
 
 def swings(strokes: Iterable[Stroke]) -> list[Stroke]:
-    """Complete strokes to and fro: those in one direction are joined, and those shorter than `RINGING` left out.
+    """Complete strokes in alternating directions: those in one direction joined, those below `RINGING` omitted.
 
-    Where a drive rings, it rests for moments on its way, and its bristles spring back a little.
+    A ringing drive rests for moments on its way, and its bristles spring back a little.
     """
     done = [one for one in strokes if np.isfinite(one.end)]
     longest = max((abs(one.ends - one.begins) for one in done[len(done) // 2 :]), default=0.0)
@@ -65,24 +65,24 @@ def swings(strokes: Iterable[Stroke]) -> list[Stroke]:
 
 @dataclass
 class Trace:
-    """Values at times of a motion: time, error, velocity of the measured place, force of the controller, others."""
+    """Recorded rows of a motion (time, error, velocity of the measured position, controller force, others); strokes."""
 
     rows: list[Array] = field(default_factory=list)
     strokes: list[Stroke] = field(default_factory=list)
 
 
 class Motion:
-    """A motion from rest at place 0 under a target.
+    """A motion from rest at position 0 under a target.
 
     Parameters
     ----------
     plant : Plant
     segments : Segments
-        Target of one lane, to the end of the motion.
+        Motion of the target, in one lane, to the end of the motion.
     rtol : float
-        For contacts with memory.
+        Relative error allowed per step with nonlinear friction.
     besides : sequence of ndarray (width,)
-        Rows of further values that are kept.
+        Rows of further values that are recorded.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class Motion:
     # -- the run
 
     def run(self) -> Iterator[Stroke | None]:
-        """Go on to the end of the target's segments, step by step; yields a stroke where one ends."""
+        """Advance to the end of the target's segments, step by step; yield each stroke that ends, else None."""
         spans = zip(
             self.segments.end[0], self.segments.jump[0], self.segments.value[0, :, 0], self.segments.slope[0, :, 0],
             strict=True,
@@ -124,7 +124,7 @@ class Motion:
         n = self.plant.size
         for end, jump, velocity, slope in spans:
             self.changes -= 1
-            self.core.control[Control.CONSTANT] = 0.0  # a sample has yet to see it
+            self.core.control[Control.CONSTANT] = 0.0  # no sample has measured the new target yet
             self.state[2 * n + 1] += jump
             self.expected = max(self.expected, abs(self.state[2 * n + 1]))
             self.state[2 * n + 2] = velocity
@@ -135,14 +135,14 @@ class Motion:
                 yield from self._to(float(end))
 
     def table(self) -> Array:
-        """Time, error, velocity of the measured place, force and further values so far, (times, 4 or more)."""
+        """Time, error, velocity of the measured position, force and further values so far, (times, 4 or more)."""
         self.watched[2] = self._piece().force
         now = np.array([[self.time, *(self.watched @ self.state)]])
         kept = [*self.trace.rows, *([now] if self.time > 0 else [])]
         return np.concatenate(kept) if kept else np.zeros((0, 1 + len(self.watched)))
 
     def _to(self, end: float) -> Iterator[Stroke | None]:
-        """Go on to the end, or in the compiled core until the mode may change, and by a step or to a sample then."""
+        """Advance towards `end` (s): in the compiled core until the mode may change, then by a step or to a sample."""
         piece = self._piece()
         if self.sampled or not piece.linear or (piece.fastest > 0 and not self.fresh):
             end = self._follow(end)
@@ -153,7 +153,7 @@ class Motion:
                 break
 
     def _follow(self, end: float) -> float:
-        """Go on in this mode; the time up to which steps are to be taken, if any."""
+        """Advance in this mode by the compiled core; returns the time (s) up to which steps are needed, if any."""
         clock, strokes = self.core.clock, self.trace.strokes
         last = strokes[-1] if strokes else Stroke(0.0, 0.0)
         rests = self.sampled and not any(self.mode.contacts)
@@ -187,7 +187,7 @@ class Motion:
         return self._exact_steps if self._piece().linear else self._bristle_steps
 
     def _step(self, end: float) -> Stroke | None:
-        """Take one step, at most to a switch or the `end`; the stroke that it completes, or None."""
+        """Take one step, at most to a switch or the `end` (s); returns the stroke that it completes, or None."""
         piece, stepper = self._piece(), self._stepper
         length, coefficients = stepper.step(piece, self.state, end - self.time)
         self.steps += 1
@@ -216,12 +216,16 @@ class Motion:
         self.state = stepper.until(piece, self.state, coefficients, length, share)
         self.at_once += 1
         if self.at_once > AT_ONCE:
-            raise NotAvailable("the contacts switch between rest and sliding without time passing; not decided")
+            raise NotAvailable(
+                f"contacts switched between rest and sliding {AT_ONCE} times at one instant, so that the motion is "
+                "not determined; try a friction law with bristles, law = 'lugre'"
+            )
         return self._switched(switches[crossed[1]])
 
     # -- switches
 
     def _switched(self, switch: Switch) -> Stroke | None:
+        """Change the mode; returns the stroke that ends by it, or None."""
         moved = any(self.mode.contacts)
         self.fresh |= {(switch.name, switch.number)}
         self.mode = self.mode.switched(switch)
@@ -238,7 +242,7 @@ class Motion:
         self.state[n : 2 * n] -= share * (slip / float(contact.row @ share))
 
     def _settle_contacts(self) -> None:
-        """Let contacts at rest slide that would need more friction than there is at rest."""
+        """Switch contacts to sliding that would need more friction than the largest at rest."""
         for _ in self.plant.contacts:
             piece = self._piece()
             forces = {i: float(row @ self.state) for i, row in piece.resting.items()}
@@ -251,7 +255,7 @@ class Motion:
             self.fresh |= {("contact", worst)}
 
     def _placed(self) -> None:
-        """Positions of all switches after a jump of the target or of the force."""
+        """Determine the mode anew after a jump of the target or of the force."""
         plant, limits, moved = self.plant, self.plant.limits, any(self.mode.contacts)
         if not self.sampled:
             if limits.dead_band is not None:
@@ -269,10 +273,10 @@ class Motion:
         self._settle_contacts()
         self._stroke(moved)
 
-    # -- what is kept
+    # -- recording
 
     def _stroke(self, moved: bool) -> Stroke | None:
-        """Begin or end a stroke if the contacts have begun or ceased to move; the one that ended."""
+        """Begin or end a stroke if contacts have started or stopped to slide; returns the one that ended, or None."""
         moves, strokes = any(self.mode.contacts), self.trace.strokes
         error = float(self.watched[0] @ self.state)
         if moves and not moved:
@@ -289,13 +293,13 @@ class Motion:
         self._keep(self.time + share * length * NODES, values)
 
     def _keep(self, times: Array, values: Array) -> None:
-        """Keep values (rows, nodes) of a step at its times, and the extremes of the stroke."""
+        """Record values (rows, nodes) of a step at its times, and the extremes of the stroke."""
         self.trace.rows.append(np.array([times[KEPT], *values[:, KEPT]]).T)
         if self.trace.strokes:
             self._widen(_least(values[0]), -_least(-values[0]), -_least(-np.abs(values[1])))
 
     def _widen(self, lowest: float, highest: float, fastest: float) -> None:
-        """Extend the extremes of the last stroke, and of all."""
+        """Extend the extremes of the last stroke and of the motion."""
         last = self.trace.strokes[-1]
         last.lowest, last.highest = min(last.lowest, float(lowest)), max(last.highest, float(highest))
         last.fastest = max(last.fastest, float(fastest))
@@ -304,26 +308,26 @@ class Motion:
 
     @property
     def _far(self) -> float:
-        """Error (m or rad) from which on nothing ends its growth; infinite if nothing tells."""
+        """Error (m or rad) beyond which its growth has no end; infinite if no friction, load or target sets a scale."""
         far = AWAY * max(self.expected, abs(float(self.state[2 * self.plant.size + 1])))
         return far or np.inf
 
     @property
     def _pace(self) -> float:
-        """Speed (m/s or rad/s) beside which what is at rest hardly moves."""
+        """Scale of speed (m/s or rad/s): the fastest so far, or that of bristles."""
         return max([self.fastest, *(one.slow for one in self.plant.contacts)])
 
     @property
     def runs_away(self) -> bool:
-        """True if the error has become so large that nothing ends its growth."""
+        """True if the error has become so large that its growth has no end."""
         return self._far < self.farthest
 
     @property
     def at_rest(self) -> bool:
-        """True if nothing moves any more and the controller's integral is constant, or winds up behind a force limit.
+        """True if all speeds are zero and the controller's integral is constant, or winds up behind a force limit.
 
-        Sliding, or bristles, that ever slower approach the target count as at rest where the error is `STILL` of the
-        largest.
+        An ever slower approach to the target, in sliding or with bristles, counts as rest once the error is below
+        `STILL` of the largest.
         """
         n = self.plant.size
         if self.state[2 * n + 2] or self.acceleration or (any(self.mode.contacts) and self.plant.memory):
@@ -348,7 +352,7 @@ def _side(name: str, value: float, bound: float) -> Switch:
 
 
 def _least(values: Array) -> float:
-    """Least value of a smooth function at evenly spaced places, by a parabola through the least and its neighbours."""
+    """Minimum of a smooth function from evenly spaced values, by a parabola through the least and its neighbours."""
     i = int(np.argmin(values))
     if not 0 < i < len(values) - 1:
         return float(values[i])
@@ -358,20 +362,20 @@ def _least(values: Array) -> float:
 
 
 def _excess(force: float, most: float) -> float:
-    """Share by which a force is beyond the largest friction at rest; infinite where there is no friction."""
+    """Relative excess of a force over the largest friction at rest; infinite where there is no friction."""
     return force / most - 1.0 if most > 0 else (np.inf if force > 0 else -1.0)
 
 
 def _reach(segments: Segments) -> float:
-    """Way (m or rad) of the target over all segments but the last, which may have no end."""
+    """Path length (m or rad) of the target over all segments but the last, which may have no end."""
     rates = np.abs(segments.value[0, :-1, 0]) * (segments.end - segments.start)[0, :-1]
     return float(np.abs(segments.jump[0]).sum() + rates.sum())
 
 
 def natural_sizes(plant: Plant, pull: float) -> Array:
-    """Least sizes of the variables, from which errors of curved contacts are counted; without any they do not matter.
+    """Smallest sizes (width,) of the variables for error control; used with nonlinear friction only.
 
-    `pull` is the size of the loads (N, or Pa) that may press contacts besides their preload.
+    `pull` is the size of the loads (N, or Pa) that may act on contacts besides their preload.
     """
     found = np.full(plant.width, 1.0)
     n = plant.size
@@ -388,10 +392,10 @@ def natural_sizes(plant: Plant, pull: float) -> Array:
         friction = max(friction, float(one.port.area * law.steady_strength(one.slow, normal)))
         speed = max(speed, one.slow)
     stiff = plant.gains[0][0] + float(np.max(np.diag(plant.stiffness)))
-    if not friction:  # nothing presses: as bristles bend at most
+    if not friction:  # without normal force: from the largest deflection of bristles
         friction = (stiff or 1.0) * float(np.max(found[2 * n + 4 : place], initial=0.0)) or 1.0
     found[:n] = found[2 * n + 1] = far = friction / stiff if stiff else 1.0
-    speed = speed or float(np.sqrt(friction * far / plant.inertia.max()))  # gained over that way
+    speed = speed or float(np.sqrt(friction * far / plant.inertia.max()))  # speed gained over the distance `far`
     found[n : 2 * n] = found[2 * n + 2] = speed
     found[2 * n] = friction / plant.integral if plant.integral else 1.0
     found[2 * n + 3] = friction
@@ -399,13 +403,13 @@ def natural_sizes(plant: Plant, pull: float) -> Array:
 
 
 def largest_normal(contact: HeldContact, pull: float) -> float:
-    """Normal stress of a contact with loads of a size `pull` (N, or Pa)."""
+    """Largest normal stress (Pa, or N) of a contact with loads of a size `pull` (N, or Pa)."""
     shares = sum(max(one.forward, one.back) for one in contact.loads)
     return contact.normal + pull * shares / float(contact.port.area)
 
 
 def friction_at_rest(contact: HeldContact, pull: float) -> float:
-    """Largest friction force at rest (N, or Pa) with loads of a size `pull`, of bristles that of slow sliding."""
+    """Largest friction force at rest (N, or Pa) with loads of a size `pull`; with bristles that of slow sliding."""
     if not contact.slow:
         return contact.rest + pull * float(sum(one.rest * max(one.forward, one.back) for one in contact.loads))
     slow = contact.slow * 1e-6  # far below the velocity from which on friction depends on it

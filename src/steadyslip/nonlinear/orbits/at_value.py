@@ -26,12 +26,12 @@ from steadyslip.nonlinear.orbits.ranges import Neighbour, checks_of, is_open
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer, orbit_of
 
 MOST_STEPS_BETWEEN = 40  # continuation steps between two neighbours on a branch
-PERIODS = 4  # a recurrence is known from the third slip event on, which begins two periods after the start
-ASIDE = 1e-2  # distance, in unknowns, from an unstable cycle at which a motion begins
+PERIODS = 4  # simulated: recurrence needs a third slip event, which begins two periods after the start
+ASIDE = 1e-2  # initial distance of a motion from an unstable cycle, in shooting unknowns
 
 
 def tracer_of(onset: Onset, steady: int, rtol: float | None) -> Tracer:
-    """Build a `Tracer` for the cycles of an onset without limits of the parameter."""
+    """A `Tracer` for the cycles of an onset, without limits of the parameter; `steady`: index of steady sliding."""
     rig = onset.rig.with_values({onset.along: onset.value})
     return Tracer(Flow(rig, onset.along, steady, rtol, onset.contact), onset, (-np.inf, np.inf), MOST_STEPS_BETWEEN)
 
@@ -39,9 +39,9 @@ def tracer_of(onset: Onset, steady: int, rtol: float | None) -> Tracer:
 def cycles_at(
     onset: Onset, steady: int, rtol: float | None, value: float, stretches: Sequence[Sequence[Cycle]]
 ) -> tuple[list[Cycle], list[tuple[Cycle, Cycle]]]:
-    """Cycles at one parameter value, from continuous parts of a branch, in its order.
+    """Cycles at one parameter value, and pairs of neighbours around it between which none was found.
 
-    Second come neighbours to both sides of the value between which no cycle was found.
+    `stretches` are the continuous parts of a branch; cycles are returned in its order.
     """
     tracer = tracer_of(onset, steady, rtol)
     found, missed = list[Cycle](), list[tuple[Cycle, Cycle]]()
@@ -63,13 +63,13 @@ class Simulation:
     Attributes
     ----------
     start : str
-        Where it began, in words.
+        Description of the initial state.
     outcome : str
-        What it did, in words.
+        Description of the motion.
     cycle : Cycle or None
-        The stable cycle that it comes to; None if it settles, ends, or does not repeat itself as far as it was run.
+        Stable cycle that the motion approaches; None if it settles, ends, or does not repeat within the simulated time.
     multiple : float
-        Period of that cycle over that of the unstable cycle beside which the motion began; NaN where there is none.
+        Period of `cycle` over that of the unstable cycle beside which the motion began; NaN without one of these.
     """
 
     start: str
@@ -87,18 +87,17 @@ class CyclesAt(tuple[Cycle, ...]):
     Attributes
     ----------
     multiples : tuple of int
-        For each cycle 1 if it is one of the branch, 2 of its cycles of twice the period and so on; 0 if simulation
-        found it.
+        For each cycle 1 if it lies on the branch, 2 on its cycles of twice the period and so on; 0 if it was found by
+        simulation.
     missed : tuple of str
-        Neighbours on the branch or its doublings between which there is a cycle that could not be computed, in words.
+        Descriptions of cycles between neighbours on the branch or its doublings that could not be computed.
     simulated : tuple of Simulation
-        What motions showed that were simulated because no cycle of the branch or its doublings attracts; empty if one
-        does.
+        Simulated motions, if no cycle of the branch or its doublings attracts; else empty.
     between : tuple of Neighbour or None
-        Then, the nearest places below the value and above it at which cycles of the branch or its doublings change or
-        stop: they bound the window in which none of these attracts. None where there is no such place.
+        With `simulated`: nearest bifurcation or end of the branch or its doublings below the value and above it, the
+        bounds of the window in which none of these cycles attracts; None where there is none.
     sentence : str
-        Of the rig itself (`CycleBranch.at_rig`): what the slip events of its stable cycle are; else empty.
+        At the rig itself (`CycleBranch.at_rig`): description of the slip events of its stable cycle; else empty.
     """
 
     multiples: tuple[int, ...]
@@ -113,18 +112,18 @@ class CyclesAt(tuple[Cycle, ...]):
         simulated: Sequence[Simulation] = (), between: tuple[Neighbour | None, Neighbour | None] = (None, None),
         window: str = "",
     ) -> CyclesAt:  # fmt: skip
-        """Build the tuple of cycles with the outcomes of simulations and the description of the window."""
-        made = super().__new__(cls, cycles)
-        made.multiples, made.missed = tuple(multiples), tuple(missed)
-        made.simulated, made.between = tuple(simulated), between
-        made._window, made.sentence = window, ""
-        return made
+        """Tuple of cycles with the outcomes of simulations and the description of the window."""
+        self = super().__new__(cls, cycles)
+        self.multiples, self.missed = tuple(multiples), tuple(missed)
+        self.simulated, self.between = tuple(simulated), between
+        self._window, self.sentence = window, ""
+        return self
 
-    def telling(self, sentence: str) -> CyclesAt:
-        """The same cycles with a sentence on the slip events."""
-        made = CyclesAt(self, self.multiples, self.missed, self.simulated, self.between, self._window)
-        made.sentence = sentence
-        return made
+    def with_sentence(self, sentence: str) -> CyclesAt:
+        """Copy with a sentence on the slip events."""
+        copy = CyclesAt(self, self.multiples, self.missed, self.simulated, self.between, self._window)
+        copy.sentence = sentence
+        return copy
 
     def __str__(self) -> str:
         rows = list(map(_row, self, self.multiples))
@@ -133,11 +132,11 @@ class CyclesAt(tuple[Cycle, ...]):
         return "\n".join(f"{name:<{NAMES}}{what}" if name else what for name, what in rows)
 
 
-NAMES = 16  # width of the names of lines
+NAMES = 16  # width of the first column of the text, characters
 
 
 def _row(cycle: Cycle, multiple: int) -> tuple[str, str]:
-    """Name and contents of the line on a cycle."""
+    """First column and text of the line on a cycle."""
     low, high = (format_quantity(v, "m/s") for v in (cycle.lowest_velocity, cycle.peak_velocity))
     of = f", of those of {multiple} times the period" if multiple > 1 else ""
     name = "stable cycle" if cycle.stable else "unstable cycle"
@@ -145,16 +144,16 @@ def _row(cycle: Cycle, multiple: int) -> tuple[str, str]:
 
 
 def slip_sentence(rig: Slider | Machine, cycle: Cycle, steady: int = 0) -> str:
-    """Sentence on the slip events of a cycle of the rig itself, from `PERIODS` periods; empty if there are none."""
+    """Sentence on the slip events of a cycle of the rig, simulated for `PERIODS` periods; empty if there are none."""
     with suppress(SteadyslipError):
         return simulate(rig, until=PERIODS * cycle.period, initial=cycle.start, branch=steady).sentence
     return ""
 
 
 def own_motion(rig: Slider | Machine, along: str) -> str:
-    """Sentence on what a rig does as it is, beside steady sliding: the cycle that it comes to, with its slip events.
+    """Sentence on the rig's motion from beside steady sliding: the stable cycle that it approaches, with slip events.
 
-    Empty where its motion cannot be computed. `along` is the name of a parameter that the rig has.
+    Empty if the motion cannot be computed. `along` is the name of a parameter that the rig has.
     """
     with suppress(SteadyslipError, Failure, np.linalg.LinAlgError):
         name = rig.parameter_along(along)
@@ -172,7 +171,7 @@ def own_motion(rig: Slider | Machine, along: str) -> str:
 def simulations(
     onset: Onset, steady: int, rtol: float | None, value: float, beside: Sequence[Cycle]
 ) -> list[Simulation]:  # fmt: skip
-    """Simulate from beside unstable cycles and steady sliding until a motion reaches a stable cycle."""
+    """Simulated motions from beside unstable cycles and steady sliding, up to the first that reaches a stable cycle."""
     tracer, found = tracer_of(onset, steady, rtol), list[Simulation]()
     for cycle in (*beside, None):
         start = "beside a cycle" if cycle else "beside steady sliding"
@@ -202,7 +201,7 @@ def _start(tracer: Tracer, value: float, cycle: Cycle | None) -> tuple[Array, st
 
 
 def _at_value(tracer: Tracer, low: Cycle, high: Cycle, value: float) -> Cycle | None:
-    """Solve for the cycle at a value between two neighbours, by continuation from either; None if it fails."""
+    """Cycle at a value between two neighbours, by continuation from either; None if that fails."""
     for one, other in ((low, high), (high, low)):
         if one.value == value:
             return one
@@ -214,7 +213,7 @@ def _at_value(tracer: Tracer, low: Cycle, high: Cycle, value: float) -> Cycle | 
 
 
 def _closed(tracer: Tracer, cycle: Cycle) -> Cycle:
-    """The cycle, solved again from the motion that begins on it where it attracts but does not close well enough."""
+    """The cycle; solved again from a simulated motion if it is stable and its closing error too large."""
     if not (is_open(cycle) and cycle.stable):
         return cycle
     again = motion_from(tracer.flow, orbit_of(cycle).states[0], cycle.value, attracts=True).cycle
@@ -222,7 +221,7 @@ def _closed(tracer: Tracer, cycle: Cycle) -> Cycle:
 
 
 def _reached(tracer: Tracer, start: Cycle, end: Cycle, value: float) -> Cycle:
-    """Follow the branch from one known cycle towards another until the value is passed; return the cycle there."""
+    """Cycle at a value of the parameter, by following the branch from one known cycle towards another."""
     orbits = orbit_of(start), orbit_of(end)
     first = tracer.shooting(scales=orbits[0].scales)
     ends = [first.packed(replace(orbit, states=orbit.states[:1])) for orbit in orbits]
@@ -234,4 +233,4 @@ def _reached(tracer: Tracer, start: Cycle, end: Cycle, value: float) -> Cycle:
         if (here.cycle.value - value) * (now.cycle.value - value) <= 0:
             return tracer.between(here, now, value).cycle
         here = now
-    raise Failure("not reached")
+    raise Failure("the value was not reached from the neighbouring cycles")

@@ -41,21 +41,21 @@ class CycleBranch(Displayed):
         The edge at which the branch begins.
     cycles : tuple of Cycle
     special : tuple of SpecialCycle
+        Bifurcations of the branch.
     end : str
-        Why the branch stops.
+        Reason for which the branch stops.
     doubled : CycleBranch or None
-        The cycles of twice the period that begin at the period doublings, of each of them in turn; its parts end at
-        another doubling, or in words.
+        Cycles of twice the period, one part for each period doubling that begins it; a part ends at another doubling,
+        or for the reason in `end` or `broken`.
     gaps : tuple of int
-        Numbers of the cycles before which the branch is not continuous: a piece broke off, and simulation found
-        another beyond it; 0 where nothing was found at the edge itself. Of doubled cycles: where those of another
-        doubling begin.
+        Indices of the cycles before which the branch is not continuous: a piece broke off, and simulation found
+        another beyond it; 0 if no cycle was found at the edge itself. In `doubled`: where the next part begins.
     broken : tuple of str
-        For each gap, why the piece before it was not followed any further.
+        For each gap, the reason for which the piece before it ends.
     steady : int
-        Which steady sliding, where there are several.
+        Index of the steady sliding, by rising normal stress, where a rig has several.
     rtol : float or None
-        Error allowed per step, as asked for.
+        Relative error allowed per integration step, as given to `steadyslip.cycles`.
     contact : str
         Of a machine whose branch ends where a contact is lost, or with a blow-up: the contact that lifts off, or that
         is the fastest; else empty.
@@ -64,7 +64,7 @@ class CycleBranch(Displayed):
     repeated : int
         Number of cycles that were computed again with smaller errors per step, because a check failed.
     not_followed : tuple of (End, str)
-        Places from which no cycles were followed, and why: the work was used up, or none was found there.
+        Ends from which no cycles were followed, and why: integration steps were used up, or no cycle was found.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -93,7 +93,7 @@ class CycleBranch(Displayed):
     def __getitem__(self, name: str) -> Array:
         """One quantity along the branch: ``value``, ``period``, ``peak_velocity``, ``stress_drop``, ...
 
-        Of a machine ``force_drop`` and so on, at the contact of its cycles; at others ``guide.peak_velocity``.
+        For a machine ``force_drop`` and so on, at the contact of its cycles; at another ``guide.peak_velocity``.
         """
         own, columns = quantities(self.rig), self._of_contacts()
         if name in columns:
@@ -113,24 +113,24 @@ class CycleBranch(Displayed):
         return units | {name: RANGE_UNITS[what] for name, (_, what) in self._of_contacts().items()}
 
     def _area(self, name: str) -> float | None:
-        """Area (m²) by which a quantity is multiplied for display as a total; None if it is not."""
+        """Area (m²) that converts a quantity to a force for display; None for a rig without area."""
         return self.rig.printed_area(self.along)
 
     def at(self, value: float) -> CyclesAt:
         """The cycles that exist at one value of the parameter, corrected to full precision.
 
-        Those of the branch come first, then those of twice the period and so on. If none of them attracts, motions are
-        simulated at the value; the stable cycle that one comes to, if it does, is the last, and ``simulated`` of what
-        comes back says what each motion showed: cycles of several slip events may lie on branches of their own, in
-        windows among irregular motion. ``between`` are the special cycles, or ends of a branch, that bound the window
-        around the value, ``multiples`` tell cycles of twice the period, and ``missed`` says what could not be computed.
+        Cycles of the branch come first, then those of twice the period and so on. If none of them attracts, motions are
+        simulated at the value; a stable cycle that one of them reaches is the last, and ``simulated`` of the result
+        describes each motion: cycles of several slip events may lie on branches of their own, in windows among
+        irregular motion. ``between`` are the bifurcations, or ends of a branch, that bound the window around the value,
+        ``multiples`` mark cycles of twice the period, and ``missed`` describes cycles that could not be computed.
         """
         found, multiples, missed = list[Cycle](), list[int](), list[str]()
         branch: CycleBranch | None = self
         levels = list[CycleBranch]()
         while branch is not None:
             here, gaps = cycles_at(self.onset, self.steady, self.rtol, value, branch._continuous())
-            here = [one for one in here if not any(map(one.is_like, found))]  # sheets of doublings can be one
+            here = [one for one in here if not any(map(one.is_like, found))]  # parts of doubled branches may coincide
             found, multiples = found + here, multiples + len(here) * [2 ** len(levels)]
             missed += [f"a cycle {self._between(*ends)} could not be computed" for ends in gaps]
             levels.append(branch)
@@ -147,22 +147,22 @@ class CycleBranch(Displayed):
 
     @cached_property
     def at_rig(self) -> CyclesAt:
-        """The cycles at the rig's own value of the parameter, as of `at`, computed once.
+        """The cycles at the rig's own value of the parameter, as from `at` (cached).
 
-        Its ``sentence`` tells the slip events of the last stable cycle.
+        ``sentence`` of the result describes the slip events of the last stable cycle.
         """
         found = self.at(float(self.rig.value(self.along) or 0.0))
         stable = [one for one in found if one.stable]
-        return found.telling(slip_sentence(self.rig, stable[-1], self.steady)) if stable else found
+        return found.with_sentence(slip_sentence(self.rig, stable[-1], self.steady)) if stable else found
 
     def _between(self, low: Cycle, high: Cycle) -> str:
-        """Describe two neighbours between which a cycle lies, for a message."""
+        """Format the parameter values and periods of two neighbours, for a message on the cycle between them."""
         where = " and ".join(format_quantity(one.value, self.unit, 6, self._area("value")) for one in (low, high))
         periods = " and ".join(format_quantity(one.period, "s") for one in (low, high))
         return f"between {where}, of a period between {periods},"
 
     def _continuous(self) -> list[list[Cycle]]:
-        """Cycles, folds included, of each continuous part of the branch."""
+        """List of cycles, folds included, for each continuous part of the branch."""
         starts = (0, *self.gaps, len(self.cycles))
         folds = {point.index: point.cycle for point in self.special if point.kind == "fold"}
         found = []
@@ -176,12 +176,12 @@ class CycleBranch(Displayed):
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
-        """Stretches of cycles of equal stability, in the order of the branch; they end at special cycles."""
+        """Stretches of cycles of equal stability, in the order of the branch; they end at bifurcations."""
         return tuple(stretches_of(self.cycles, self.special, self.gaps, self.bounds))
 
     @property
     def stable_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Ranges of the parameter (SI units) in which cycles of the branch attract, in its order; they may overlap."""
+        """Ranges (low, high) of the parameter (SI units) with stable cycles, in branch order; they may overlap."""
         return tuple(one.range for one in self.stretches if one.stable)
 
     @property
@@ -190,7 +190,7 @@ class CycleBranch(Displayed):
         return (*self.onset.checks, *checks_of(self.cycles, self.repeated))
 
     def to_xarray(self) -> Any:
-        """An xarray.Dataset over ``point``."""
+        """The quantities of the cycles as xarray.Dataset over ``point``, SI units."""
         import xarray as xr
 
         names = self._units()
@@ -216,11 +216,10 @@ class CycleBranch(Displayed):
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON-ready dict, SI units, as ``steadyslip cycles --json`` prints it."""
-
         at = self.at_rig
         own = [self._cycle_as_dict(one) | {"multiple": n} for one, n in zip(at, at.multiples, strict=True)]
-        said = {"missed": list(at.missed), "simulated": list(map(str, at.simulated)), "sentence": at.sentence}
-        return self._as_dict() | {"at_rig": {"value": self.rig.value(self.along), "cycles": own, **said}}
+        texts = {"missed": list(at.missed), "simulated": list(map(str, at.simulated)), "sentence": at.sentence}
+        return self._as_dict() | {"at_rig": {"value": self.rig.value(self.along), "cycles": own, **texts}}
 
     def _cycle_as_dict(self, cycle: Cycle) -> dict[str, Any]:
         """A cycle as JSON-ready dict, SI units."""
@@ -238,7 +237,7 @@ class CycleBranch(Displayed):
         return found | {"multipliers": [[m.real, m.imag] for m in (complex(cycle.trivial), *cycle.multipliers)]}
 
     def _as_dict(self) -> dict[str, Any]:
-        """The branch and those of twice the period as JSON-ready dict, SI units, without the cycles at the rig."""
+        """The branch and its doublings as JSON-ready dict, SI units, without the cycles at the rig."""
         plain = self._cycle_as_dict
         return {
             "parameter": self.along,
@@ -269,19 +268,19 @@ class CycleBranch(Displayed):
 
     @property
     def swing_label(self) -> str:
-        """Label of `swings`, apart from the drop in which an event of a run ends."""
+        """Label of `swings`, which differ from the stress drops of slip events in a simulation."""
         if self.cycles and self._lever(self.cycles[0]) is not None:
             return "torque swing"
         return stress_name(self.rig.result_name("stress swing"), self.rig.area)
 
     def swings(self) -> tuple[Array, str]:
-        """Swing of what pulls along the branch and its unit: Pa, of a machine N, at a body that turns N m."""
+        """Highest less lowest pull in each cycle, and its unit: Pa, for a machine N, at a body that turns N m."""
         levers = [self._lever(one) for one in self.cycles]
         unit = "N m" if any(one is not None for one in levers) else self.rig.result_unit("Pa")
         return np.array([one.stress_drop * (by or 1.0) for one, by in zip(self.cycles, levers, strict=True)]), unit
 
     def _lever(self, cycle: Cycle) -> float | None:
-        """Radius (m) of the contact of a cycle whose body turns, which may be what varies; None for others."""
+        """Radius (m) of the contact of a cycle if its body turns, else None; the radius may be the free parameter."""
         lever = self.rig.lever_at(cycle.contact) if cycle.contact else None
         return cycle.value if lever is not None and self.along == f"contacts.{cycle.contact}.radius" else lever
 
@@ -296,7 +295,7 @@ class CycleBranch(Displayed):
         return "\n".join(lines)
 
     def _lines(self) -> list[str]:
-        """Summary of the branch and of those of twice the period."""
+        """Lines of text on the branch and its doublings."""
         area = self._area("value")
         edge = format_quantity(self.onset.value, self.unit, 6, area)
         lines = [f"cycles along {self.along} from the {self.onset.title} at {edge}: {len(self.cycles)} cycles"]
@@ -340,7 +339,7 @@ def _plain(one: CycleRange) -> dict[str, float | None]:
 
 
 def _stable(branch: CycleBranch) -> str:
-    """Describe the parameter ranges in which the cycles are stable."""
+    """Format the parameter ranges in which the cycles are stable: "all", "none", or ranges."""
     if all(one.stable for one in branch.stretches):
         return "all"
     area = branch.rig.printed_area(branch.along)

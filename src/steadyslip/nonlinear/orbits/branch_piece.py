@@ -15,11 +15,11 @@ from steadyslip.nonlinear.orbits.special import BranchPoint
 class BranchPiece:
     """Cycles in the order in which they were followed, and the bifurcations among them.
 
-    `whole` is False where the cycles could not be followed any further, and True for an end with a physical reason.
+    `end` is the reason for which the piece ends; `whole` is True for a physical reason, False if continuation failed.
     `contact` names the contact of a machine that lifts off at the end, or is the fastest. `begins` and `stops` are the
-    ends where these are not the first and last cycle; `beyond` is the next cycle past the end, not part of the piece.
-    `rest` yields the cycles that follow where its part of the work was used up, after `steps` steps of integration.
-    `followed` is False for a place from which nothing was followed; `end` is the reason.
+    ends, if these are not the first and last cycle; `beyond` is the next cycle past the end, not part of the piece.
+    If the integration steps allowed for the piece were used up, `rest` yields the cycles that follow and `steps` is the
+    number of steps taken. `followed` is False for an end from which no cycle was followed, for the reason `end`.
     """
 
     points: list[BranchPoint] = field(default_factory=list)
@@ -37,7 +37,7 @@ class BranchPiece:
 
     @property
     def bounds(self) -> tuple[End, End]:
-        """First and last end of the piece."""
+        """Ends at which the piece begins and stops."""
         ends = []
         for end, i in ((self.begins, 0), (self.stops, -1)):
             if end is None and self.points:
@@ -52,7 +52,7 @@ class BranchPiece:
         return BranchPiece(self.points[::-1], special, self.end, self.whole, self.contact, self.stops, self.begins)
 
     def joined(self, more: BranchPiece) -> BranchPiece:
-        """Join this piece and `more`, which begins where this one ends."""
+        """This piece with the cycles of `more`, which begins where this one ends, appended."""
         count = len(self.points)
         special = [replace(one, index=one.index + count) for one in more.special]
         return BranchPiece(

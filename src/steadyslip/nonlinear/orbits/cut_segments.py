@@ -1,7 +1,7 @@
 """Choose shooting segments such that deviations across the motion grow little within each.
 
-A deviation along the motion is a matter of time only: in a slip event of many decades it grows with the velocity and
-shrinks with it again. It is left out, and cuts are made where the motion is slow.
+A deviation along the motion is only a shift in time: in a slip event of many decades it grows and shrinks with the
+velocity. It is projected out, and cuts are made where the motion is slow.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from steadyslip.core.arrays import Array
 from steadyslip.kernels.layout import Recorded
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
-NODES = 48  # candidate places of a cut
-MOST_GROWTH = 1e3  # largest growth of deviations within a segment
-QUICK = 30.0  # speed, in units of the mean along the cycle, above which no cut is made
+NODES = 48  # number of candidates for the start of a segment
+MOST_GROWTH = 1e3  # largest growth of deviations within a segment (ratio)
+QUICK = 30.0  # speed of the state, over its mean in the cycle, above which no cut is made
 
 
 def cut(shooting: Shooting, u: Array) -> Orbit | None:
-    """Divide an orbit into new segments; None if they would be no more than the present ones.
+    """The orbit divided into new segments; None if there would be no more of them than now.
 
     Raises
     ------
     Failure
-        If the motion cannot be run through.
+        If the motion over a period cannot be integrated.
     """
     flow, orbit = shooting.flow, shooting.orbit(u)
     setting = flow.setting(orbit.value)
@@ -44,7 +44,7 @@ def cut(shooting: Shooting, u: Array) -> Orbit | None:
 
 
 def _nodes(shooting: Shooting, orbit: Orbit) -> tuple[Array, Array]:
-    """Times (s) and states of candidate cuts: evenly spread along the cycle in the unknowns, where motion is slow."""
+    """Times (s) and states of candidate cuts: evenly spaced along the cycle in the unknowns, where motion is slow."""
     flow = shooting.flow
     setting = flow.setting(orbit.value)
     times, states = [], []
@@ -65,7 +65,7 @@ def _nodes(shooting: Shooting, orbit: Orbit) -> tuple[Array, Array]:
 
 
 def _cuts(steps: Array) -> list[int]:
-    """Indices of the nodes at which segments start; each is as long as `MOST_GROWTH` allows."""
+    """Indices of the nodes at which segments start; each segment is as long as `MOST_GROWTH` allows."""
     found, running = [0], [steps[0]]
     for k in range(1, len(steps)):
         further = [steps[k] @ product for product in (*running, np.eye(len(steps[k])))]

@@ -1,8 +1,8 @@
 """Find the cycle near a simulated motion that seems to repeat itself, by Newton's method, and its properties.
 
-Peaks that agree are no proof of a cycle: ringing after a kick, or a slow approach to something else, have them too. A
-cycle is believed only where the equations of a cycle are solved, next to the motion, by a state that does not return
-earlier.
+Equal peaks do not prove a cycle: ringing after a kick, or a slow approach to something else, has them too. A cycle is
+accepted only if the shooting equations have a solution near the motion, and its period is not a multiple of a shorter
+one.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 
 PRIMES = np.array(
     [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31]
-)  # how often a cycle may be counted round; others are products
-STEEPER = 3.0  # factor by which another passage must be steeper to become the start of the cycle; chosen by trial
+)  # numbers of turns of a shorter cycle that are tested; others are products
+STEEPER = 3.0  # ratio of accelerations above which another passage becomes the start of the cycle; chosen by trial
 SAME = 1e-4  # distance, as a share of the cycle's size, within which a state counts as returned
 
 
 def amplitude(velocity: Array) -> float:
-    """Half of ln(highest/lowest) of slip rates; infinite where the block stops or turns round."""
+    """Half of ln(highest/lowest) of slip rates; infinite where the block stops or reverses."""
     high, low = float(velocity.max()), float(velocity.min())
     if not low > 0:
         return np.inf
@@ -63,16 +63,16 @@ class CycleData:
     ----------
     cycle : Cycle
     turns : int
-        How often the motion goes round a shorter cycle in the period, or a prime factor of it, up to 31: the state
-        is back after so small a part of the period. 1 for a true cycle.
+        Number of times that the period contains a shorter one, or a prime factor of that number, up to 31; 1 for a
+        primitive cycle.
     half : ndarray (n,)
-        How far the state is from the start after half the period, in natural sizes.
+        Change of the state from the start to half the period, in natural sizes.
     extent : ndarray (n,)
-        Range that each state variable goes through.
+        Range of each state variable in the cycle.
     begin : Orbit or None
-        The same cycle, roughly, from where slip passes the load point's velocity most steeply: where that is much
-        steeper than where it begins. Where slip only just reaches that velocity, a cycle has no such beginning a little
-        further along its branch.
+        Approximate orbit of the cycle that starts where slip passes the load point's velocity with the largest
+        acceleration; None unless that is `STEEPER` times the present one. A start at which slip only just reaches that
+        velocity disappears a little further along the branch.
     """
 
     cycle: Cycle
@@ -83,12 +83,12 @@ class CycleData:
 
 
 def cycle_data(shooting: Shooting, u: Array) -> CycleData:
-    """Compute the cycle that a solution vector `u` of the shooting equations stands for, and its properties.
+    """Cycle of a solution vector `u` of the shooting equations, with its properties.
 
     Raises
     ------
     FlowFailure
-        If the run meets states at which no velocity balances the forces.
+        If the motion reaches states at which no velocity balances the forces.
     """
     flow, orbit = shooting.flow, shooting.orbit(u)
     setting = flow.setting(orbit.value)
@@ -112,7 +112,7 @@ def cycle_data(shooting: Shooting, u: Array) -> CycleData:
             start = _start(flow, flow.observed(setting, first[:, Recorded.TIME], first[:, Recorded.POINT :]))
     each = [tuple(map(np.concatenate, zip(*parts, strict=True))) for parts in zip(*passed, strict=True)]
     if not all(np.all(np.isfinite(column)) for columns in each for column in columns):
-        raise FlowFailure("stuck")  # forces do not balance at every state: the motion is none
+        raise FlowFailure("stuck")  # forces do not balance at every state
     ranges = [_range(*columns) for columns in each]
     own = ranges[flow.contact]
     names = [contact.name for contact in flow.reduction.model.contacts]
@@ -145,18 +145,17 @@ def cycle_data(shooting: Shooting, u: Array) -> CycleData:
 
 
 def closing_error(missed: Array, along: Array, period: float, amplitude: float) -> float:
-    """How far a motion misses a cycle after a period, as a share of its size, or comes there early or late.
+    """Closing error of a cycle: distance across it as a share of its size, or in time as a share of the period.
 
-    A cycle is a curve: of what is missed, the part along it is a time, and counts as a share of the period. Where slip
-    begins after a rest of many times its duration, an error of the period far below what is told is most of a cycle's
-    size a moment later.
+    The part of the distance along the motion is converted to a time: where slip begins after a long rest, a tiny error
+    of the period grows to most of the cycle's size a moment later.
 
     Parameters
     ----------
     missed : ndarray (K, n)
         Ends of the segments less the starts of the next, over their sizes.
     along : ndarray (K, n)
-        Rates at these starts, over the same sizes (1/s).
+        Rates of the state at these starts, over the same sizes (1/s).
     period : float
         s.
     amplitude : float
@@ -178,7 +177,7 @@ class _Begin:
         self.steepest = STEEPER * float(self.setting.slip @ jacobian[0] @ rates[0])
 
     def look(self, outcome: Outcome) -> None:
-        """Keep the steepest passage in an integrated part of the cycle, if much steeper than the present start."""
+        """Store the orbit from the steepest passage in an integrated part of the cycle, if steeper than `steepest`."""
         times, slopes = passages(self.flow, self.setting, outcome.recorded)
         if len(slopes) and slopes.max() > self.steepest:
             self.steepest = float(slopes.max())
@@ -187,15 +186,15 @@ class _Begin:
             self.orbit = Orbit(state, self.now.period, self.now.value, ONE, self.now.scales)
 
 
-BEGINS = LOG_KINDS.index("slip begins")  # of a slip event: the block, speeding up, is as fast as the load point
-RINGS = 8  # passages per slip event, ringing included, for which further slip events are waited for
-RETURNS = 17  # returns that are compared: cycles with up to 16 returns per period are found
+BEGINS = LOG_KINDS.index("slip begins")  # slip event begins: the block, accelerating, is as fast as the load point
+RINGS = 8  # assumed passages per slip event, ringing included
+RETURNS = 17  # number of returns that are compared: cycles with up to 16 returns per period are found
 NEAR = 0.1  # largest distance from the motion to the solution, as a share of the cycle's size
-CLOSE = 0.05  # distance below which two returns may be at one place of a cycle
+CLOSE = 0.05  # largest distance of two returns a period apart, as a share of the motion's size
 SMALLEST = 1e-5  # range, in natural sizes, below which a motion counts as steady sliding
-MOST_TRIES = 4  # numbers of returns per period that are tried
-FIRST_SPAN = 60.0  # length of the first simulation, natural times
-MOST_STEPS = 40_000  # integration steps per stretch of motion
+MOST_TRIES = 4  # limit of numbers of returns per period that are tried
+FIRST_SPAN = 60.0  # duration of the first simulation, natural times
+MOST_STEPS = 40_000  # limit of integration steps per stretch of motion
 
 
 def cycle_near(
@@ -209,17 +208,17 @@ def cycle_near(
     state : ndarray (n,)
         The kernel's state variables (``outcome.state[row]``), anywhere near the suspected cycle.
     value : float
-        Of the free parameter, where `runs` has one.
+        Value of the free parameter, if `runs` has one.
     patience : int
-        How many stretches of some returns each to go on for, as long as no cycle is close enough.
+        Limit of stretches (of up to `RETURNS` returns each) that are simulated until a cycle is found.
     unknowns : ndarray (u,), optional
-        Of the balances at `state`, where they are known.
+        Solutions of the algebraic equations at `state`, where they are known.
 
     Returns
     -------
     Cycle or None
-        The primitive cycle next to the motion, with multipliers; ``cycle.stable`` says whether it attracts.
-        None if there is none: the motion grows, settles, wanders, or is still too far from any.
+        The primitive cycle next to the motion, with multipliers; ``cycle.stable`` is True if it attracts.
+        None if no cycle is near: the motion grows, settles, is irregular, or still too far from a cycle.
     """
     return motion_from(runs, state, value, patience, unknowns=unknowns).cycle
 
@@ -228,9 +227,9 @@ def motion_from(
     runs: FlowRunner, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
     unknowns: Array | None = None,
 ) -> Simulated:  # fmt: skip
-    """Simulate from a state: the cycle that the motion approaches, or a description of what it does instead.
+    """Cycle that a motion from a state approaches, or None, and a description of the motion.
 
-    Parameters are those of `cycle_near`; with `attracts` cycles that are not stable are skipped.
+    Parameters are those of `cycle_near`; with `attracts` unstable cycles are skipped.
     """
     returns, low, high = 0, np.inf, -np.inf
     try:
@@ -260,10 +259,10 @@ class Simulated:
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
-    """Returns of a motion: where and when the block, speeding up, is as fast as the load point; and their sizes.
+    """Returns of a motion: times (m,), s, and states (m, n) at which slip, accelerating, passes the load point's speed.
 
-    `extent` is the largest range of a state variable, in its natural size, `amplitude` that of ln v, `speeds` the
-    lowest and the highest velocity.
+    `extent` is the largest range of a state variable, in natural sizes, `amplitude` half the range of ln v, `speeds`
+    the lowest and the highest velocity, m/s.
     """
 
     times: Array
@@ -276,7 +275,7 @@ class _Stretch:
 def _stretches(
     runs: FlowRunner, setting: FlowSetting, state: Array, unknowns: Array | None, patience: int
 ) -> Iterator[_Stretch]:
-    """Yield the motion in parts of some returns each."""
+    """Yield up to `patience` consecutive stretches of the motion, of up to `RETURNS` returns each."""
     span, spent, sticks = FIRST_SPAN * runs.time, 0, False
     for _ in range(patience):
         slips, passes = _Returns(), _Returns()
@@ -298,7 +297,7 @@ def _stretches(
             sticks = sticks or len(slips.times) > 0
             state, unknowns = outcome.state[0], outcome.unknowns[0]
             now, spent = now + span, spent + len(record)
-            returned = len(slips.times) if sticks else len(passes.times)  # ringing in between is no measure of a period
+            returned = len(slips.times) if sticks else len(passes.times)  # not ringing
             span *= 2.0 if returned < RETURNS // 2 else 1.0
         seen = slips if len(slips.times) > 1 and _since(slips, passes) < RINGS * RETURNS else passes
         times, states = seen.times[-RETURNS:], seen.states[-RETURNS:]
@@ -309,14 +308,14 @@ def _stretches(
 
 
 class _Returns:
-    """Times and states at which a motion was at the place where cycles begin."""
+    """Times (s) and states (n,) at which a motion returned to the start of cycles."""
 
     def __init__(self) -> None:
         self.times: list[float] = []
         self.states: list[Array] = []
 
     def add(self, times: Array, states: Array) -> None:
-        """Further ones."""
+        """Append times (m,) and states (m, n)."""
         self.times += list(times)
         self.states += list(states)
 
@@ -324,8 +323,8 @@ class _Returns:
 def _enough(slips: _Returns, passes: _Returns, sticks: bool) -> bool:
     """True if there are enough returns to compare: starts of slip events, or all passages if there are none.
 
-    Ringing after a slip event passes the same place, but returns only with the next event: once a motion had one
-    (`sticks`), passages count alone only where far more of them follow than a slip rings.
+    Ringing after a slip event passes the start of cycles too, but the motion returns only with the next event: once it
+    had an event (`sticks`), passages alone suffice only if far more of them follow than a slip rings.
     """
     several = len(slips.times) > 2 and len(passes.times) >= RINGS * RETURNS
     return len(slips.times) >= RETURNS or several or _since(slips, passes) >= (RINGS if sticks else 1) * RETURNS
@@ -338,19 +337,19 @@ def _since(slips: _Returns, passes: _Returns) -> int:
 
 
 def _ends(speeds: list[Array]) -> tuple[float, float]:
-    """Lowest and highest of several arrays."""
+    """Lowest and highest value of several arrays."""
     return float(min(one.min() for one in speeds)), float(max(one.max() for one in speeds))
 
 
 def _candidates(runs: FlowRunner, seen: _Stretch) -> Array:
-    """Numbers of returns that a period may have: those after which the motion was close to its present place."""
+    """Numbers of returns that a period may have: so many returns ago the motion was close to its last state."""
     places = np.arcsinh(seen.states / runs.scales)
     away = np.abs(places[-2::-1] - places[-1]).max(axis=1)
     return 1 + np.flatnonzero(away < CLOSE * min(1.0, seen.extent))[:MOST_TRIES]
 
 
 def _solved(runs: FlowRunner, value: float, seen: _Stretch, back: int) -> Cycle | None:
-    """Solve for the cycle next to the last return, with `back` returns per period; None if there is none."""
+    """Cycle next to the last return, with `back` returns per period; None if Newton's method finds none."""
     shooting = Shooting(runs, np.ones(1), False, abs(value) or 1.0)
     shooting.amplitude = min(1.0, seen.extent)
     period = seen.times[-1] - seen.times[-1 - back]
@@ -358,23 +357,23 @@ def _solved(runs: FlowRunner, value: float, seen: _Stretch, back: int) -> Cycle 
         return None
     runs.begin_motion()
     guess = shooting.packed(Orbit(seen.states[-1:], period, value))
-    still = np.eye(len(guess))[-1]  # the parameter stays
+    still = np.eye(len(guess))[-1]  # the parameter is fixed
     try:
         point = shooting.curve().corrected(guess, still, 0.0, NEAR * shooting.amplitude)
-        seen_once = cycle_data(shooting, point.u)
+        data = cycle_data(shooting, point.u)
     except (Failure, np.linalg.LinAlgError):
         return None
-    cycle = replace(seen_once.cycle, returned=_returned(runs, seen, back))
+    cycle = replace(data.cycle, returned=_returned(runs, seen, back))
     shrunk = cycle.amplitude < 0.5 * seen.amplitude
     sure = abs(cycle.trivial - 1) <= IMPRECISE or cycle.returned <= RETURNED
-    return cycle if sure and not shrunk and seen_once.turns == 1 else None
+    return cycle if sure and not shrunk and data.turns == 1 else None
 
 
 def _returned(runs: FlowRunner, seen: _Stretch, back: int) -> float:
     """Largest distance between returns of the motion a period apart, over the last two periods; NaN if it had fewer.
 
-    Where a bristle rings between long rests, deviations grow and shrink by many decades within a period, and the
-    multipliers lose their digits; the motion does not.
+    Where a bristle rings between long rests, deviations grow and shrink by many decades within a period, so that
+    multipliers are inaccurate, but the simulated motion is not.
     """
     places = np.arcsinh(seen.states / runs.scales)
     last = places[-2 * back - 1 :]

@@ -15,13 +15,13 @@ from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.special import BranchPoint, lies_between
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, USED_UP, Tracer, orbit_of
 
-SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a piece broke off to the end of the range
+SEEDS = (0.003, 0.03, 0.2, 0.6)  # parameter values of simulations: shares of the way from the break to the range's end
 AHEAD = 2.0  # initial displacement of a motion beside steady sliding, natural sizes of slip
-PATIENCE = 12  # stretches of motion within which it has to reach a cycle
+PATIENCE = 12  # number of stretches (see `cycle_from_motion`) within which a motion has to reach a cycle
 
 
 def search_on(tracer: Tracer, pieces: list[BranchPiece]) -> None:
-    """Add pieces found by simulation, as long as the last one does not cross the unstable range."""
+    """Append pieces found by simulation, until the last one crosses the unstable range of steady sliding."""
     low, high = tracer.limits
     onset = tracer.onset
     limit = low if onset.stable == "above" else high
@@ -49,7 +49,7 @@ def search_on(tracer: Tracer, pieces: list[BranchPiece]) -> None:
 
 
 def _crossed(piece: BranchPiece, tracer: Tracer) -> bool:
-    """True if a piece ends for a physical reason other than leaving the range on the stable side."""
+    """True if a piece ends for a physical reason other than reaching the limit of the range on the stable side."""
     if not piece.whole or not piece.points:
         return False
     if not piece.end.startswith("end of the range"):
@@ -58,7 +58,7 @@ def _crossed(piece: BranchPiece, tracer: Tracer) -> bool:
 
 
 def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle]) -> BranchPoint | None:
-    """Simulate from known cycles and from beside steady sliding; return the first cycle that is reached, or None."""
+    """First cycle reached by motions from known cycles `near` and from beside steady sliding; None if there is none."""
     try:
         starts = [orbit_of(cycle).states[0] for cycle in near] + [tracer.flow.ahead(value, AHEAD)]
     except Failure:
@@ -74,7 +74,7 @@ def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle]) -> BranchPoint 
 
 
 def _add_piece(tracer: Tracer, pieces: list[BranchPiece], seed: BranchPoint, away: float) -> None:
-    """Follow a cycle both ways: back to a known piece or the edge, and forward."""
+    """Follow the branch from a cycle both ways, and join the new piece to a known one that it meets, or append it."""
     forth = seed if seed.point.tangent[-1] * away > 0 else replace(seed, point=turned_round(seed.point))
     back = replace(forth, point=turned_round(forth.point))
     step = 0.1 * LARGEST_STEP
@@ -102,7 +102,7 @@ def met(pieces: list[BranchPiece], known: BranchPoint) -> bool:
 
 
 def cut_back(piece: BranchPiece, meeting: Cycle) -> None:
-    """Remove the cycles of a piece beyond the place at which another piece met it."""
+    """Remove the cycles of a piece that follow the neighbours of `meeting`, at which another piece met it."""
     for i in range(len(piece.points) - 1):
         if lies_between(piece.points[i].cycle, piece.points[i + 1].cycle, meeting):
             del piece.points[i + 1 :]

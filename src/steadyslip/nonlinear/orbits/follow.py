@@ -1,6 +1,6 @@
 """Follow the branch of cycles from the edge of stability: `cycles`, the entry point of this folder.
 
-Branches of twice the period are followed from each period doubling to the one where they end.
+Cycles of twice the period are followed from each period doubling to the doubling at which they end.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from steadyslip.nonlinear.orbits.special import MET, SMALL, log_features
 from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, USED_UP, Tracer, orbit_of
 
 SMALLEST = 1e-12  # smallest amplitude of ln v: some thousand roundings of the velocity
-FINER, FINEST = 1e-2, 1e-13  # factor of rtol for recomputed cycles, and the smallest rtol above rounding
+FINER, FINEST = 1e-2, 1e-13  # factor on rtol for recomputed cycles, and the smallest rtol above rounding
 MOST_REPEATED = 40  # largest number of recomputed cycles: where more fail, the user should ask for a smaller rtol
 LARGER = (1e-4, 1e-3, 1e-2, 1e-1)  # amplitudes of ln v to begin with where smaller cycles cannot be followed
 
@@ -68,21 +68,21 @@ def cycles(
         Range in which to follow, SI units or text; by default a factor of a thousand to each side of the edge
         for positive parameters, the whole domain for others.
     amplitude : float, optional
-        Of ln(v/v0) at which the branch starts; 1e-6, with mass 1e-4, unless given, and more where no branch of such
-        small cycles can be followed.
+        Amplitude of ln(v/v0) of the first cycle; by default 1e-6, with mass 1e-4, and more where no branch from so
+        small a cycle can be followed.
     doublings : int, optional
         Number of successive period doublings to follow onto the branch of twice the period.
     most_points : int, optional
-        Limit of cycles on a branch. Four million steps of integration are the limit of work on it, and as many on its
-        cycles of twice the period, shared by the doublings: cycles found until then are kept, and ``end`` gives this
-        reason; ``not_followed`` lists doublings for which nothing was left.
+        Limit of cycles on a branch. Its integration steps are limited to four million, those of its cycles of twice the
+        period to as many, shared by the doublings. Cycles found until then are kept, and ``end`` gives the reason;
+        ``not_followed`` lists doublings for which no steps were left.
     rtol : float, optional
-        Error allowed per step of integration; 1e-10, with mass 1e-9, of machines 1e-8, unless given.
+        Relative error allowed per integration step; by default 1e-10, with mass 1e-9, for machines 1e-8.
     branch : int, optional
-        Index of the steady sliding, where there are several. The result stores it, and `rtol`.
+        Index of the steady sliding, by rising normal stress, where a rig has several.
     progress : callable, optional
-        Called with the number of cycles found and the latest one. Ctrl-C (or KeyboardInterrupt from here) returns
-        what there is.
+        Called with the number of cycles found and the latest one. Ctrl-C, or a KeyboardInterrupt that it raises,
+        returns the cycles found so far.
 
     Returns
     -------
@@ -98,12 +98,12 @@ def cycles(
     Notes
     -----
     Pseudo-arclength continuation of shooting equations, with the variational equations integrated beside the
-    motion; several shooting segments where one period is too unstable. A point is accepted only as the continuation
-    of the one before, and as a primitive cycle, which does not return earlier. Where the branch from the edge breaks
-    off before it has crossed the unstable range (canards, pieces behind a subcritical onset), motions are simulated
-    there; from the cycle that one comes to, if Newton's method confirms it, another piece is followed both ways, and
-    joined if it meets the first (`CycleBranch.gaps`). Cycles of twice the period are entered at each doubling along the
-    eigenvector of the multiplier −1, and followed to the doubling at which they end or until they cannot be followed.
+    motion; several shooting segments where one period is too unstable. A point is accepted only if it continues the
+    curve, and as a primitive cycle, which does not repeat within its period. Where the branch from the edge breaks off
+    before it has crossed the unstable range (canards, pieces behind a subcritical onset), motions are simulated there;
+    from a cycle that one of them reaches and Newton's method confirms, another piece is followed both ways, and joined
+    if it meets the first (`CycleBranch.gaps`). Cycles of twice the period are started at each doubling along the
+    eigenvector of the multiplier −1, and followed to the doubling at which they end or until continuation fails.
 
     Examples
     --------
@@ -122,7 +122,7 @@ def cycles(
 
 
 def _branch(tracer: Tracer, pieces: list[BranchPiece], rtol: float | None, doublings: int) -> CycleBranch:
-    """Join the pieces of a branch, follow the cycles of twice the period, and build the result."""
+    """Result of `cycles`: pieces of a branch joined, and cycles of twice the period followed from its doublings."""
     left = [(piece.bounds[0], piece.end) for piece in pieces if not piece.followed]
     pieces = [piece for piece in pieces if piece.followed] or pieces[:1]
     whole, gaps, ends = pieces[0], [], [pieces[0].end]
@@ -148,7 +148,7 @@ def _branch(tracer: Tracer, pieces: list[BranchPiece], rtol: float | None, doubl
 
 
 def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
-    """Recompute cycles whose checks fail with a smaller error per step; return all cycles and the number replaced."""
+    """All cycles, those whose checks fail computed again with a smaller error per step, and the number replaced."""
     failing = [i for i, cycle in enumerate(found) if is_open(cycle) or is_undecided(cycle)][:MOST_REPEATED]
     if not failing or tracer.interrupted:
         return found, 0
@@ -158,7 +158,7 @@ def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
         finer = Tracer(
             Flow(flow.rig, flow.name, flow.branch, rtol, tracer.onset.contact), tracer.onset, tracer.limits, tracer.most
         )
-        finer.flow.last_step = finer.last_step  # one long cycle may take more than the whole branch did
+        finer.flow.last_step = finer.last_step  # one long cycle may take more steps than a run is allowed
         for i in failing:
             if finer.is_spent:
                 break
@@ -172,9 +172,9 @@ def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
 
 
 def _from_the_edge(tracer: Tracer, amplitude: float | None) -> BranchPiece:
-    """Follow the branch piece that begins at the edge of stability.
+    """Piece of the branch that begins at the edge of stability.
 
-    Where small cycles drown in rounding, as next to an almost degenerate onset, it begins at larger ones.
+    Where rounding hides small cycles, as at an almost degenerate onset, it begins with a larger one.
     """
     smallest = max(1e-6, 1e9 * tracer.flow.noise)
     tried: list[BranchPiece] = []
@@ -187,7 +187,7 @@ def _from_the_edge(tracer: Tracer, amplitude: float | None) -> BranchPiece:
 
 
 def _of_amplitude(tracer: Tracer, amplitude: float) -> BranchPiece:
-    """Follow the branch piece that begins at the edge with the cycle of a given small amplitude of ln v."""
+    """Piece of the branch that begins at the edge, with the cycle of a given small amplitude of ln v."""
     onset = End("onset", tracer.onset.value)
     try:
         shooting, first = tracer.small(amplitude)
@@ -202,7 +202,7 @@ def _of_amplitude(tracer: Tracer, amplitude: float) -> BranchPiece:
 
 
 def _limits(rig: Slider | Machine, onset: Onset, between: Sequence[Any] | None) -> tuple[float, float]:
-    """Lowest and highest value of the parameter (SI units) to follow the branch to; checks what the user gave."""
+    """Lowest and highest parameter value (SI units) of the branch, from `between` (checked) or by default."""
     role = rig.parameters()[onset.along].role
     if between is None:
         if role.domain.low == 0 and onset.value > 0:
@@ -219,14 +219,14 @@ def _limits(rig: Slider | Machine, onset: Onset, between: Sequence[Any] | None) 
     return low, high
 
 
-SIZES = (1e-3, 1e-4, 1e-5, 1e-2)  # distances of the first cycle from the doubling, in unknowns, tried in this order
+SIZES = (1e-3, 1e-4, 1e-5, 1e-2)  # distances of the first doubled cycle from the doubling, in unknowns, as tried
 
 
 def doubled_pieces(tracer: Tracer, flips: Sequence[Cycle]) -> list[BranchPiece]:
-    """Follow the cycles of twice the period from each doubling at which no earlier piece has ended.
+    """Pieces of cycles of twice the period, from each doubling `flips` at which no earlier piece ends.
 
-    Each doubling may take an equal part of the work that is left, and what others leave goes to those that need more:
-    first to the doublings of cycles that attract on one side, where those of twice the period may attract too.
+    The integration steps left are shared equally by the doublings; unused ones go to those that need more. Doublings
+    of cycles that are stable on one side come first, as their cycles of twice the period may be stable.
     """
     pieces: list[BranchPiece] = []
     reached: set[int] = set()
@@ -245,18 +245,18 @@ def doubled_pieces(tracer: Tracer, flips: Sequence[Cycle]) -> list[BranchPiece]:
 
 
 def _may_attract(flip: Cycle) -> bool:
-    """True if no multiplier but that of the doubling is outside the unit circle."""
+    """True if all multipliers but that of the doubling lie inside the unit circle."""
     others = sorted(flip.multipliers, key=lambda one: abs(one + 1))[1:]
     return all(abs(one) < 1 for one in others)
 
 
 def _go_on(tracer: Tracer, pieces: list[BranchPiece], flips: Sequence[Cycle], reached: set[int]) -> None:
-    """Go on with the pieces whose part of the work was used up, with equal parts of what the others have left."""
+    """Extend the pieces whose integration steps were used up, with equal parts of the steps that are left."""
     while waiting := [piece for piece in pieces if piece.rest is not None]:
         for k, piece in enumerate(waiting):
             if tracer.interrupted or tracer.is_spent:
                 return
-            if piece in pieces:  # else another one has met it
+            if piece in pieces:  # else it was joined to another piece
                 tracer.allot(len(waiting) - k)
                 others = [one for one in pieces if one is not piece]
                 tracer.gone_on(piece, met=partial(met, others))
@@ -264,7 +264,7 @@ def _go_on(tracer: Tracer, pieces: list[BranchPiece], flips: Sequence[Cycle], re
 
 
 def _settle(tracer: Tracer, pieces: list[BranchPiece], i: int, flips: Sequence[Cycle], reached: set[int]) -> None:
-    """End a piece at the doubling that it has reached, or join it to the one that it has met."""
+    """End piece `i` at the doubling that it has reached, or join it to the piece that it has met."""
     piece = pieces[i]
     if piece.end == ENDS["doubling"]:
         other = _nearest(flips, piece)
@@ -277,7 +277,7 @@ def _settle(tracer: Tracer, pieces: list[BranchPiece], i: int, flips: Sequence[C
 
 
 def _entered(tracer: Tracer, pieces: list[BranchPiece], flip: Cycle) -> BranchPiece:
-    """Follow the piece from one doubling, as far as possible or to a known piece."""
+    """Piece of cycles of twice the period from one doubling, to its end or to a known piece."""
     begins, why = End("period doubling", flip.value, flip), ""
     for size in SIZES:
         if tracer.interrupted or tracer.is_spent:
@@ -307,9 +307,9 @@ def _nearest(flips: Sequence[Cycle], piece: BranchPiece) -> int | None:
 
 
 def _close(tracer: Tracer, piece: BranchPiece, flip: Cycle) -> None:
-    """Append a cycle next to the doubling at which a piece ends, as near to it as the first cycle is to its own.
+    """End a piece at a doubling: append a cycle near it, at a distance of `SIZES`.
 
-    The cycle there begins in the half of the period in which the one before it does.
+    Of the two cycles near the doubling, which differ by half a period, the one in phase with the last cycle is taken.
     """
     piece.stops = End("period doubling", flip.value, flip)
     last = piece.points[-1]
@@ -325,7 +325,7 @@ def _close(tracer: Tracer, piece: BranchPiece, flip: Cycle) -> None:
 
 
 def _join(pieces: list[BranchPiece], piece: BranchPiece) -> None:
-    """Join a piece to the one that it has met."""
+    """Join a piece to the one of `pieces` that it has met, between two doublings."""
     meeting = piece.beyond or piece.points[-1]
     i = next(i for i, one in enumerate(pieces) if met([one], meeting))
     cut_back(pieces[i], meeting.cycle)

@@ -15,16 +15,16 @@ from steadyslip.nonlinear.orbits.special import NOISE, SMALL
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Consecutive cycles of a branch that all attract or all do not, between the places where that changes.
+    """Consecutive cycles of a branch that are all stable or all unstable, between changes of stability.
 
     Attributes
     ----------
     stable : bool
     cycles : tuple of Cycle
-        Both ends included, where there is a cycle.
+        With those of the ends, if an end has one.
     ends : tuple of End
-        Where it begins and stops along the branch: kinds are those of `SpecialCycle` and of `End`, or ``not located``
-        where stability changes between the last cycle of the stretch and its neighbour at no cycle that was found.
+        First and last end along the branch, with a kind of `SpecialCycle` or `End`, or ``not located`` if no
+        bifurcation was found between the last cycle of the stretch and its neighbour of other stability.
     """
 
     stable: bool
@@ -33,7 +33,7 @@ class Stretch:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Lowest and highest value of the parameter, SI units; of cycles within rounding of an end, the end's."""
+        """Lowest and highest value of the parameter, SI units; cycles within rounding of an end count as at it."""
         ends = [end.value for end in self.ends]
         values = [value for value in (cycle.value for cycle in self.cycles) if not _near(value, ends)]
         return min([*values, *ends]), max([*values, *ends])
@@ -47,7 +47,7 @@ def _near(value: float, ends: Sequence[float]) -> bool:
 def stretches_of(
     cycles: Sequence[Cycle], special: Sequence[SpecialCycle], gaps: Sequence[int], bounds: Sequence[tuple[End, End]]
 ) -> Iterator[Stretch]:
-    """Split a branch into stretches of equal stability, in its order; `bounds` are the ends of each of its parts."""
+    """Yield the stretches of equal stability of a branch, in order; `bounds` are the ends of its continuous parts."""
     where = {point.index: End(point.kind, point.cycle.value, point.cycle) for point in special}
     for (start, stop), (begins, stops) in zip(pairwise((0, *gaps, len(cycles))), bounds, strict=True):
         changes = [i for i in range(start + 1, stop) if cycles[i].stable != cycles[i - 1].stable]
@@ -67,9 +67,9 @@ class Neighbour:
     Attributes
     ----------
     kind : str
-        That of `SpecialCycle` or of `End`.
+        Kind of a `SpecialCycle` or `End`.
     value : float
-        Of the parameter, SI units.
+        Value of the parameter, SI units.
     multiple : int
         1 on the branch itself, 2 on its cycles of twice the period, and so on.
     """
@@ -79,7 +79,7 @@ class Neighbour:
     multiple: int
 
     def words(self, unit: str, area: float | None) -> str:
-        """Name and place of the neighbour, for messages."""
+        """Format name and parameter value of the neighbour, for messages."""
         name = WORDS.get(self.kind, self.kind)
         of = "" if self.multiple == 1 else f" of the cycles of {self.multiple} times the period"
         return f"the {name}{of} at {format_quantity(self.value, unit, 6, area)}"
@@ -105,32 +105,32 @@ def neighbours(levels: Sequence[Changing], value: float) -> tuple[Neighbour | No
 
 
 def checks_of(cycles: Sequence[Cycle], repeated: int = 0) -> tuple[Check, ...]:
-    """Checks over several cycles, with the number that fail; `repeated` were computed again."""
+    """Worst checks of several cycles, with the number of cycles that fail; `repeated` were computed again."""
     kinds = (
         ("", 0, is_open, cycles),
         ("stability of ", 1, is_undecided, [one for one in cycles if not _is_small(one)]),
     )
     found = []
-    for what, place, fails, asked in kinds:
-        if not asked:
+    for what, place, fails, some in kinds:
+        if not some:
             continue
         worst = max(
-            (one.checks[place] for one in asked), key=lambda one: one.error / one.allowed if one.allowed else inf
+            (one.checks[place] for one in some), key=lambda one: one.error / one.allowed if one.allowed else inf
         )
-        failing, how = sum(map(fails, asked)), worst.how
+        failing, how = sum(map(fails, some)), worst.how
         how += f"; {repeated} computed again with smaller errors per step" if repeated else ""
-        many = f"{failing} of {len(cycles)}" if failing else f"{len(asked)}"
+        many = f"{failing} of {len(cycles)}" if failing else f"{len(some)}"
         found.append(replace(worst, what=f"{what}{many} cycle{'' if many == '1' else 's'}", how=how))
     return tuple(found)
 
 
 def is_open(cycle: Cycle) -> bool:
-    """True if the motion that begins on a cycle does not return to its start."""
+    """True if the closing error of a cycle is too large."""
     return not cycle.checks[0].passed
 
 
 def is_undecided(cycle: Cycle) -> bool:
-    """True if errors of the multipliers leave stability open and the cycle is too large to use the kind of onset."""
+    """True if errors of the multipliers leave stability undecided, and the kind of onset does not decide it."""
     return not (cycle.checks[1].passed or _is_small(cycle))
 
 

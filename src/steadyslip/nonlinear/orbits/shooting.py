@@ -2,8 +2,8 @@
 
 Unknowns are asinh(state/scale) at the start of each segment, the logarithm of the period, and the free parameter:
 linear for small motions, logarithmic for large ones, so that branches over many decades are nearly straight.
-The cycle starts where the block, speeding up, is as fast as the load point: every cycle
-passes there, whatever its size. Several segments are used where one would be too unstable.
+The cycle starts where the block, accelerating, is as fast as the load point: every cycle has such a state, whatever its
+size. Several segments are used where one would be too unstable.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from steadyslip.nonlinear.continuation import Failure, SolutionCurve
 from steadyslip.nonlinear.orbits.flow import FlowRunner, FlowSetting, passages
 
 ONE = np.ones(1)
-ROUNDED = 300.0  # allowed last Newton step, in roundings of the state, where steps no longer shrink,
-FAR = 0.1  # residual of a prediction that is off by more than the equations are straight
-SAME = 1e-8  # difference of unknowns of which sensitivities are the same: the largest last Newton step
-KNOWN = 1e-3  # but at most this share of the cycle's size
+ROUNDED = 300.0  # largest Newton step that counts as converged once steps no longer shrink, in rounding errors of state
+KNOWN = 1e-3  # bound of that step, as a share of the cycle's size
+FAR = 0.1  # residual of a prediction above which its period is corrected first: too far for Newton's method
+SAME = 1e-8  # difference of unknowns within which cached sensitivities are used: the largest last Newton step
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit(ReadOnly):
-    """A cycle as the equations see it: states at the segment starts (K, n), period (s), parameter, shares (K,).
+    """Solution of the shooting equations: states at the segments' starts (K, n), period (s), parameter, shares (K,).
 
-    `scales` (n,) are the sizes that its states were measured by; natural ones where there are none.
+    `fractions` are the segments' shares of the period, `scales` (n,) those of the unknowns; natural sizes if None.
     """
 
     states: Array
@@ -45,13 +45,13 @@ class Shooting:
     ----------
     flow : FlowRunner
     fractions : ndarray (K,)
-        Share of the period that each segment takes; they add up to one.
+        Each segment's share of the period; they add up to one.
     logarithmic : bool
-        Whether the parameter is positive and its logarithm the unknown.
+        True if the unknown is the logarithm of the parameter over `size`, False if it is their ratio.
     size : float
-        Unit of the parameter otherwise.
+        Scale of the parameter, SI units.
     scales : ndarray (n,), optional
-        Sizes of state variables beyond which unknowns count in logarithms; natural ones unless given.
+        Sizes of state variables below which unknowns are linear, above logarithmic; natural sizes by default.
     """
 
     def __init__(
@@ -65,9 +65,9 @@ class Shooting:
         self._jacobian: Array | None = None
 
     def curve(self) -> SolutionCurve:
-        """Build the continuation curve of these equations.
+        """Continuation curve of these equations.
 
-        Its lengths and angles count the first state, period and parameter only: further segments are the same cycle.
+        Lengths and angles are those of first state, period and parameter: the other segments are part of one cycle.
         """
         weights = np.ones(self.segments * self.flow.size + 2)
         weights[self.flow.size : -2] = 0.0
@@ -85,12 +85,12 @@ class Shooting:
         return len(self.fractions)
 
     def packed(self, orbit: Orbit) -> Array:
-        """Convert an orbit to the vector of unknowns (K n + 2,)."""
+        """Vector of unknowns (K n + 2,) of an orbit."""
         value = np.log(orbit.value / self.size) if self.logarithmic else orbit.value / self.size
         return np.append(np.arcsinh(orbit.states / self.scales).ravel(), [np.log(orbit.period / self.flow.time), value])
 
     def orbit(self, u: Array) -> Orbit:
-        """Convert a vector of unknowns (K n + 2,) to an orbit; the period comes from its last but one entry."""
+        """Orbit of a vector of unknowns (K n + 2,): states, ln(period/natural time), parameter."""
         states = np.sinh(u[:-2].reshape(self.segments, self.flow.size)) * self.scales
         value = self.size * (np.exp(u[-1]) if self.logarithmic else u[-1])
         return Orbit(states, float(self.flow.time * np.exp(u[-2])), float(value), self.fractions, self.scales)
@@ -122,15 +122,16 @@ class Shooting:
         return self._residual(orbit, setting, ends, start[0]), jacobian
 
     def residuals(self, u: Array) -> Array:
-        """Residuals (K n + 1,) alone."""
+        """Residuals (K n + 1,) of unknowns (K n + 2,), without Jacobian."""
         orbit, setting = self._tried(u)
         ends = self.flow.ends(setting, orbit.states, self.fractions * orbit.period, self.amplitude)
         return self._residual(orbit, setting, ends, self.flow.field(setting, orbit.states[:1])[0][0])
 
     def retimed(self, u: Array, reach: float) -> Array:
-        """The unknowns with the period after which the motion from their start is where cycles begin; itself if near.
+        """Unknowns with the period of the nearest return of the motion to the load point's velocity, within `reach`.
 
-        Between rests of minutes slip begins in seconds: a period that is wrong by a thousandth ends before or in it.
+        Slip may begin in seconds after a rest of minutes: a period off by a thousandth then ends before it or within
+        it, where Newton's method fails. Returns `u` itself if its residuals are small.
         """
         if self.segments > 1 or np.max(np.abs(self.residuals(u))) < FAR:
             return u
@@ -141,19 +142,19 @@ class Shooting:
         return np.asarray(u + (nearest if abs(nearest) <= reach else 0.0) * np.eye(len(u))[-2])
 
     def _tried(self, u: Array) -> tuple[Orbit, FlowSetting]:
-        """Orbit and setting of unknowns; Failure where these are too large."""
+        """Orbit and kernel tables of unknowns; raises Failure if unknowns are too large."""
         if not np.all(np.isfinite(u)) or np.max(np.abs(u[:-1])) > 60 or (self.logarithmic and abs(u[-1]) > 60):
-            raise Failure("out of range")
+            raise Failure("the unknowns of a cycle leave the range of floating point")
         orbit = self.orbit(u)
         return orbit, self.flow.setting(orbit.value)
 
     def _residual(self, orbit: Orbit, setting: FlowSetting, ends: Array, start: Array) -> Array:
-        """How far the segments' ends are from the next starts, and slip from constant speed at the first (`start`)."""
+        """Residuals (K n + 1,): segments' ends less next starts, scaled, and slip rate less its target at `start`."""
         missed = (ends - np.roll(orbit.states, -1, axis=0)) / np.roll(self._stretch(orbit), -1, axis=0)
         return np.append(missed.ravel(), setting.slip @ start / setting.speed)
 
     def _stretch(self, orbit: Orbit) -> Array:
-        """Derivative of state with respect to unknown, (K, n)."""
+        """Derivatives of states with respect to their unknowns, (K, n)."""
         return np.asarray(np.hypot(self.scales, orbit.states))
 
     def multipliers(self, u: Array) -> tuple[float, Array]:
@@ -163,7 +164,7 @@ class Shooting:
         return multipliers(self.sensitivities(u), rates / self.flow.scales)
 
     def sensitivities(self, u: Array) -> Array:
-        """Derivative of each segment's end in its start, in natural scales, (K, n, n)."""
+        """Derivatives of each segment's end in its start, in natural sizes, (K, n, n)."""
         return np.asarray(self._run(u)[1] * self.flow.scales[None, :] / self.flow.scales[:, None])
 
     def forget(self) -> None:
@@ -171,7 +172,7 @@ class Shooting:
         self._last = None
 
     def _run(self, u: Array) -> tuple[Array, Array]:
-        """Ends and sensitivities of the segments; those of the latest unknowns, a last Newton step away, are kept."""
+        """Ends and sensitivities of the segments; cached for the latest unknowns, also within a last Newton step."""
         if self._last is None or np.max(np.abs(self._last[0] - u)) > SAME * self.flow.costly:
             orbit = self.orbit(u)
             times = self.fractions * orbit.period
@@ -181,27 +182,27 @@ class Shooting:
 
 
 def multipliers(sensitivities: Array, rates: Array) -> tuple[float, Array]:
-    """Floquet multipliers from the sensitivities of consecutive segments, and the rates where each starts.
+    """Floquet multipliers from sensitivities of consecutive segments (K, n, n) and rates at their starts (K, n).
 
     Returns
     -------
     trivial : float
-        The multiplier of the direction of motion, 1 but for errors.
+        The multiplier along the motion, 1 but for errors.
     others : ndarray (n-1,), complex
         By falling size.
 
     Notes
     -----
-    Sensitivities carry the rates of one segment's start to those of the next. That direction is split off first, so
-    that another multiplier near one keeps its digits. Where a cycle is very stable across (small mass), rounding in
-    the state is most of the rates, and rates carried along from the segment before are true; where it is unstable
-    they are worse. The multiplier tells which. Of what remains the block-cyclic matrix is formed, whose
-    eigenvalues are the K-th roots of the multipliers: large and small ones keep their digits.
+    Sensitivities map the rates at one segment's start to those at the next. That direction is deflated first, so that
+    another multiplier near 1 keeps its digits. In a strongly stable cycle (small mass) rounding of the state dominates
+    the rates, and rates mapped from the segment before are more accurate; in an unstable one they are less: those with
+    the trivial multiplier closer to 1 are used. The rest forms a block-cyclic matrix whose eigenvalues are the K-th
+    roots of the multipliers, so that large and small ones keep their digits.
     """
     count, n, _ = sensitivities.shape
     carried = np.roll(np.einsum("kij,kj->ki", sensitivities, rates), 1, axis=0)
     trivial, along = min(
-        ((_carried_round(sensitivities, way), way) for way in (rates, carried)), key=lambda found: abs(found[0] - 1)
+        ((_trivial(sensitivities, way), way) for way in (rates, carried)), key=lambda found: abs(found[0] - 1)
     )
     bases = [np.linalg.qr(way[:, None], mode="complete")[0][:, 1:] for way in along]
     cyclic = np.zeros((count * (n - 1), count * (n - 1)))
@@ -218,8 +219,8 @@ def multipliers(sensitivities: Array, rates: Array) -> tuple[float, Array]:
     return trivial, np.asarray(found[np.argsort(-np.abs(found))], dtype=complex)
 
 
-def _carried_round(sensitivities: Array, along: Array) -> float:
-    """Factor by which one period multiplies the direction of motion (1 but for errors)."""
+def _trivial(sensitivities: Array, along: Array) -> float:
+    """Factor by which one period multiplies the direction of motion `along` (K, n): 1 but for errors."""
     ends = np.einsum("kij,kj->ki", sensitivities, along)
     starts = np.roll(along, -1, axis=0)
     return float(np.prod(np.sum(starts * ends, axis=1) / np.sum(starts * starts, axis=1)))

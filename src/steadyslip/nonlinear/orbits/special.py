@@ -12,12 +12,12 @@ from steadyslip.nonlinear.continuation import Failure, Point
 from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
-NOISE = 3e-9  # relative difference of parameter values below which they agree within rounding, near the onset
-MET = 2e-3  # difference of the logarithms of period and velocities below which cycles are the same
+NOISE = 3e-9  # relative difference of parameter values that rounding explains near the onset
+MET = 2e-3  # difference of the logarithms of period and velocities below which two cycles count as one
 BLURRED = 10.0  # factor from the last Newton step to the uncertainty of the parameter; chosen by trial
-ROUNDING = 1e-11  # relative difference of parameter values that is rounding anywhere
+ROUNDING = 1e-11  # relative difference of parameter values that rounding explains anywhere on a branch
 FOLDED = 0.9  # growth below which a fold is rejected: at a true fold a multiplier is 1
-REAL = 1e-3  # largest relative imaginary part of a multiplier that counts as real: two that have just met differ by it
+REAL = 1e-3  # relative imaginary part below which a multiplier counts as real: errors split a double real one by it
 SMALL = 1e-2  # amplitude of ln v below which multipliers equal to 1 within rounding are decided by the kind of onset
 
 
@@ -25,8 +25,8 @@ SMALL = 1e-2  # amplitude of ln v below which multipliers equal to 1 within roun
 class BranchPoint:
     """A point of a branch of cycles: solution vector, shooting equations, and the cycle with its properties.
 
-    `half` is how far the state has moved after half a period, in natural sizes: zero where that was a whole one;
-    `extent` the range that each state variable goes through; `begin` is a better beginning, where there is one.
+    `half` (n,) is the change of state after half a period, in natural sizes: zero if half is a whole period; `extent`
+    (n,) the range of each state variable in the cycle; `begin` a start at steeper acceleration, if there is one.
     """
 
     point: Point
@@ -37,23 +37,18 @@ class BranchPoint:
     begin: Orbit | None = None
 
 
-Made = Callable[[Shooting, Point], BranchPoint]
+PointBuilder = Callable[[Shooting, Point], BranchPoint]
+"""Function of shooting equations and a solution that returns the point of the branch."""
 
 
-def changes(before: BranchPoint, now: BranchPoint, made: Made, index: int) -> list[SpecialCycle]:
-    """Locate folds, doublings and tori between two neighbouring points with the same unknowns, in order.
+def changes(before: BranchPoint, now: BranchPoint, build: PointBuilder, index: int) -> list[SpecialCycle]:
+    """Folds, period doublings and tori between two neighbouring points in the same unknowns, in order.
 
-    Where stability changes at no such cycle, as at cycles that are symmetric beyond a multiplier 1, the place is found
-    by the size of the largest multiplier. Where both have the same value of the parameter but for rounding, as in a
-    canard, multipliers are rounding too; they change by factors from one point to the next, and no doublings or tori
-    are read from them.
+    If stability changes without one of these, as with symmetric cycles beyond a multiplier 1, the zero of the
+    logarithm of the largest multiplier is located. If the parameter values of the points differ by rounding only, as in
+    a canard, the multipliers are inaccurate too, and doublings and tori are not looked for.
 
-    Parameters
-    ----------
-    made : callable
-        Makes a `BranchPoint` from shooting equations and a solution.
-    index : int
-        Place in the branch of the later point.
+    `index` is the index of the later point in the branch.
     """
     pair = [np.array(known.cycle.multipliers) for known in (before, now)]
     kinds: list[tuple[str, Callable[[Point], float]]] = []
@@ -65,21 +60,21 @@ def changes(before: BranchPoint, now: BranchPoint, made: Made, index: int) -> li
         kinds.append(("period doubling", lambda point: doubling(now.shooting.multipliers(point.u)[1])))
     if apart and min(turns) > -1 and turns[0] * turns[1] < 0:
         kinds.append(("torus", lambda point: torus(now.shooting.multipliers(point.u)[1])))
-    tried = [_located(kind, before, now, measure, made, index) for kind, measure in kinds]
+    tried = [_located(kind, before, now, measure, build, index) for kind, measure in kinds]
     found = [one for one in tried if one is not None]
     growths = [known.cycle.growth for known in (before, now)]
     changed = before.cycle.stable != now.cycle.stable and (growths[0] - 1) * (growths[1] - 1) < 0
     if changed and not found and apart and min(known.cycle.amplitude for known in (before, now)) > SMALL:
-        tried = [_located("", before, now, lambda point: growth(now.shooting.multipliers(point.u)[1]), made, index)]
+        tried = [_located("", before, now, lambda point: growth(now.shooting.multipliers(point.u)[1]), build, index)]
         found = [replace(one, kind=_passing(one.cycle)) for one in tried if one is not None]
     return sorted(found, key=lambda one: one._length)
 
 
 def may_return(earlier: BranchPoint, before: BranchPoint, now: BranchPoint) -> bool:
-    """True if a test function may have changed sign twice between two neighbours, so that none is seen.
+    """True if a test function may have changed sign twice between the neighbours `before` and `now`.
 
-    It may where it would change, had it gone on as from the cycle before them; where a multiplier comes closer to the
-    unit circle than it moves in the step, too.
+    That is so if its extrapolation from `earlier` and `before` changes sign, or if a multiplier is closer to the unit
+    circle than it moves in the step.
     """
     three = (earlier, before, now)
     lengths = [known.point.length for known in three]
@@ -89,7 +84,7 @@ def may_return(earlier: BranchPoint, before: BranchPoint, now: BranchPoint) -> b
     multipliers = [np.array(known.cycle.multipliers) for known in three]
     kinds = [(doubling, 1.0), (torus, 1.0)] if now.shooting.flow.size > 2 else []
     measures = [([measure(m) for m in multipliers], moved) for measure, moved in kinds]
-    if earlier.shooting is now.shooting:  # tangents are measured alike; from the onset on they grow by factors
+    if earlier.shooting is now.shooting:  # tangents are in the same unknowns; near the onset they grow by factors
         measures.append(([known.point.tangent[-1] for known in three], 0.0))
     for (was, here, there), moved in measures:
         if min(was, here, there) > -1 and here * there > 0:
@@ -113,21 +108,21 @@ def _passing(cycle: Cycle) -> str:
 
 
 def _located(
-    kind: str, before: BranchPoint, now: BranchPoint, measure: Callable[[Point], float], made: Made, index: int
+    kind: str, before: BranchPoint, now: BranchPoint, measure: Callable[[Point], float], build: PointBuilder, index: int
 ) -> SpecialCycle | None:
-    """Locate the zero of a test function between two points; None if that fails or is no bifurcation."""
+    """Bifurcation at the zero of a test function between two points; None if it is not found or is none."""
     shooting = now.shooting
     try:
         ends = measure(before.point), measure(now.point)
         low, high = shooting.curve().located(before.point, now.point, measure, *ends, 0.1 * shooting.flow.options.rtol)
-        cycle = made(shooting, high).cycle
+        cycle = build(shooting, high).cycle
     except Failure:
         return None
     other = shooting.orbit(low.u).value
     size = abs(cycle.value) or 1.0
     away = [abs(known.cycle.value - cycle.value) / size for known in (before, now)]
     blurred = max(NOISE, *(BLURRED * known.point.rounding for known in (before, now)))
-    if kind == "fold" and cycle.growth < FOLDED:  # the beginning of the cycle turns round, not the branch
+    if kind == "fold" and cycle.growth < FOLDED:  # the start of the cycle moves backwards, not the branch
         return None
     if kind == "fold" and (min(away) < blurred or cycle.amplitude < SMALL):
         return None
@@ -144,14 +139,14 @@ def doubling(multipliers: Array) -> float:
 def torus(multipliers: Array) -> float:
     """Test function of a torus: positive where a complex pair lies outside the unit circle; −1 without such a pair.
 
-    A pair next to 1 or −1 may be two real multipliers that have just met.
+    Pairs that are real within `REAL` are ignored: near 1 or −1 they may be two real multipliers with errors.
     """
     pairs = multipliers[np.abs(multipliers.imag) > REAL * np.abs(multipliers)]
     return float(np.max(np.abs(pairs) - 1, initial=-1.0))
 
 
 def log_features(cycle: Cycle) -> Array:
-    """Logarithms of period and velocities (3,), by which cycles are compared."""
+    """Logarithms of period (s) and peak velocity, and asinh of lowest velocity; (3,), to compare cycles."""
     lowest = np.arcsinh(cycle.lowest_velocity / cycle.speed)
     return np.array([np.log(cycle.period), np.log(cycle.peak_velocity), lowest])
 

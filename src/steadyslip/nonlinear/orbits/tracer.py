@@ -34,7 +34,7 @@ LOST = 1e-5  # error of the trivial multiplier beyond which more segments are tr
 LED = 30.0  # factor on LOST where sensitivities have loose tolerances (`FlowRunner.led`); still below `IMPRECISE`
 HIDDEN = 0.1  # largest share of rounding error in a small cycle's distance from the edge
 INTERRUPTED = "interrupted by the user"
-USED_UP = "the work was used up"
+USED_UP = "the limit of steps was reached"
 
 
 class Tracer:

@@ -1,4 +1,4 @@
-"""Basin of steady sliding: the starting points in the phase plane from which motion returns to it."""
+"""Basin of steady sliding: the initial states in a phase plane from which motion returns to it."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ from steadyslip.nonlinear.kicks.spans import (
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.follow import cycles
 
-POINTS = 81  # along each axis: an edge is placed within 1.2 % of the picture
-STEPS = 2e9  # integration steps for all motions of a basin
+POINTS = 81  # default number of points along each axis: an edge is located to 1.2 % of the picture
+STEPS = 2e9  # limit of integration steps for all motions of a basin
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,22 +52,22 @@ class Basin(ReadOnly):
     ----------
     rig : Slider or Machine
     x : ndarray (n,)
-        Slip ahead of the load point at the start, m; of a machine the place of a body, m or rad.
+        Slip ahead of the load point at the start, m; for a machine the displacement of a body, m or rad.
     v : ndarray (m,)
-        Velocity at the start, m/s or rad/s; what else spans the plane, see `names`.
+        Velocity at the start, m/s or rad/s, or the second variable in `names`.
     outcome : ndarray of str (m, n)
         ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution``, ``undecided``, ``interrupted``.
     doubt : ndarray of str (m, n)
-        Why points are undecided; empty where they are not.
+        Reason for which a point is undecided; else empty.
     cycles : tuple of History
-        One period of each unstable cycle of this rig that was found: where there is one, it bounds the basin in
-        the plane of a rig with two variables.
+        One period of each unstable cycle of this rig that was found; with two state variables it bounds the basin.
     names : tuple of str
-        What spans the plane: ``x`` and ``v``; of a machine a body's place and its velocity, or without mass a memory
-        variable of a contact.
+        Variables of the plane: ``x`` and ``v``; for a machine a body's displacement and velocity, or without mass a
+        memory variable of a contact.
     units : tuple of str
+        SI units of the variables.
     steady : tuple of float
-        Where steady sliding is in the plane.
+        Steady sliding in the plane, SI units.
     contact : ndarray of str (m, n)
         Of a machine: the contact that is lost, or fastest in a blow-up; else empty.
     """
@@ -122,25 +122,25 @@ def basin(
     progress: bool | None = None,
     branch: int = 0,
 ) -> Basin:
-    """Simulate from every point of a grid of the phase plane and find which motions return to steady sliding.
+    """Outcomes of motions from every point of a grid of the phase plane: which return to steady sliding.
 
     Parameters
     ----------
     rig : Slider or Machine
     x : array_like, optional
-        Slip ahead of the load point, m (negative: the spring is stretched); 81 values unless given, over the width
-        of what a displacement kick survives. Of a machine the place of a body from where it is in steady sliding.
+        Slip ahead of the load point, m (negative: the spring is stretched); by default 81 values, 15 natural lengths to
+        each side. For a machine the displacement of a body from steady sliding, m or rad.
     v : array_like, optional
-        Velocity, m/s or rad/s; 81 values unless given, four decades to each side of that of steady sliding. Without
-        mass, the first memory variable of a slider follows from it; of a machine it is the memory variable itself.
-        Whatever else there is starts as in steady sliding.
+        Velocity, m/s or rad/s; by default 81 values, four decades to each side of steady sliding. Without mass, the
+        first memory variable of a slider follows from it; for a machine `v` is the memory variable itself. All other
+        variables start as in steady sliding.
     at : str, optional
-        Of a machine: the body whose plane it is; unless given the one whose contact moves most in the leading mode.
+        Body of a machine whose plane it is; by default the one whose contact moves most in the leading mode.
     along : str, optional
-        The parameter along which unstable cycles of this rig are looked for; the stiffness of a slider unless given.
-        Of a machine none are looked for unless one is named.
+        Parameter along which unstable cycles of this rig are searched for; by default the stiffness of a slider. For a
+        machine cycles are searched for only if it is given.
     rtol, threads, progress, branch
-        As for `threshold_map`. After Ctrl-C, points that were not finished are ``interrupted``, and cycles those
+        As for `threshold_map`. After Ctrl-C, points without an outcome are ``interrupted``, and `cycles` are those
         found by then.
 
     Returns
@@ -154,8 +154,8 @@ def basin(
 
     Notes
     -----
-    All motions together take two billion steps of integration at most, of machines with more variables fewer, some
-    minutes on two cores; what is open then is undecided.
+    All motions together take at most two billion integration steps, fewer for machines with more variables, some
+    minutes on two cores; motions without an outcome by then are undecided.
 
     Examples
     --------
@@ -164,7 +164,7 @@ def basin(
     >>> found.outcome.tolist()
     [['returns'], ['returns']]
     """
-    steady_states(rig)  # raises, and says why
+    steady_states(rig)  # raises NoSteadySliding with the reason
     if problems := rig.place_problems("at", at, rig.ends()):
         raise ParameterError(problems)
     options = options_for(operating_point(rig, branch=branch).model, rtol)
@@ -228,8 +228,8 @@ def _plane_of(rig: Slider | Machine, rest: Rest, at: str | None) -> _Plane:
     by_name = {item.name: item for item in model.variables}
     if f"{body}.x" not in by_name:
         raise NotAvailable(
-            f"a basin is drawn over place and velocity of one body, and a structure has more of both than {body}; "
-            "threshold tells which kicks there are survived"
+            f"a basin is drawn over displacement and velocity of one body, and {body} is a point of a structure, which "
+            "has several; use threshold for the largest kick that is survived at this point"
         )
     place, speed = by_name[f"{body}.x"], f"{body}.v"
     length = float(np.ravel(scales[place.name])[0])
@@ -252,13 +252,13 @@ def _plane_of(rig: Slider | Machine, rest: Rest, at: str | None) -> _Plane:
 
 def _unstable_cycles(rig: Slider | Machine, along: str, branch: int, progress: bool | None) -> tuple[History, ...]:
     """One period of each unstable cycle at the rig's own parameter; empty where no branch can be followed."""
-    with progress_text("following cycles", progress) as said:
+    with progress_text("following cycles", progress) as show:
 
-        def told(count: int, _: Cycle) -> None:
-            said(f"following cycles, {count} so far; Ctrl-C draws the basin with these")
+        def report(count: int, _: Cycle) -> None:
+            show(f"following cycles, {count} so far; Ctrl-C draws the basin with these")
 
         try:
-            found = cycles(rig, along, doublings=0, branch=branch, progress=told)
+            found = cycles(rig, along, doublings=0, branch=branch, progress=report)
         except NotAvailable:
             return ()
     own = float(rig.parameters()[found.along].value)  # type: ignore[arg-type]
@@ -267,7 +267,7 @@ def _unstable_cycles(rig: Slider | Machine, along: str, branch: int, progress: b
 
 @checked(periods=finite(0, 1e4))
 def orbit(rig: Slider | Machine, cycle: Cycle, periods: float = 1.0) -> History:
-    """Simulate a cycle from its start for some periods, as a history for plots.
+    """Simulated motion over some periods of a cycle, from its start, for plots.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def orbit(rig: Slider | Machine, cycle: Cycle, periods: float = 1.0) -> History:
         The rig that has this cycle (its parameter at ``cycle.value``).
     cycle : Cycle
     periods : float
-        How many; unstable cycles leave themselves after a few.
+        Number of periods; a simulation leaves an unstable cycle after a few.
 
     Examples
     --------

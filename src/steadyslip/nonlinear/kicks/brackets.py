@@ -30,12 +30,11 @@ from steadyslip.nonlinear.kicks.spans import (
 from steadyslip.nonlinear.kicks.threshold import edges
 from steadyslip.protocol import Protocol
 
-COARSE = 48  # sizes in the first scan of each rig
-WIDE = 0.1  # relative width above which the middle of an undecided bracket is no threshold
+COARSE = 48  # number of sizes in the first scan of each rig
+WIDE = 0.1  # relative width of an undecided bracket above which the threshold is NaN, not its middle
 BEYOND = (*OUTCOMES[:UNDECIDED], *(f"undecided: {doubt}" for doubt in DOUBTS), "edge", "unstable", "no steady sliding",
           "out of range")  # fmt: skip
-"""What limits the kicks of a rig: what comes of the smallest that fails, why there is no size, or another reason;
-`RETURNS`: none fails."""
+"""Limits of the kicks of a rig: outcome of the smallest that fails (`RETURNS`: none fails), or reason without one."""
 EDGE, UNSTABLE, ABSENT, BEYOND_FLOATS = range(len(BEYOND) - 4, len(BEYOND))
 
 
@@ -46,11 +45,11 @@ class Brackets:
     Attributes
     ----------
     size : ndarray
-        As `threshold_map` gives it.
+        Thresholds, as returned by `threshold_map`.
     low, high : ndarray
-        Size up to which all kicks that were tried return, and smallest known not to.
+        Largest size up to which all simulated kicks return, and smallest size known not to return.
     beyond : ndarray of int
-        What limits, an index into `BEYOND`.
+        Limit, an index into `BEYOND`.
     contact : ndarray of str
         Of machines: the contact that is lost beyond, or fastest in a blow-up; else empty.
     """
@@ -86,30 +85,29 @@ def threshold_map(
     progress: bool | None = None,
     branch: int = 0,
 ) -> Any:
-    """Thresholds of many rigs, for instance over a grid of two parameters.
+    """Smallest kicks that do not return to steady sliding, for many rigs, such as a grid of two parameters.
 
     Parameters
     ----------
     rig, kick, at, direction, reference, up_to, precision, rtol, branch
         As for `threshold`.
     vary : mapping of str to array_like or xarray.DataArray
-        Parameters by dotted name, SI units; arrays broadcast, DataArrays by dimension name.
+        Arrays of values (SI units) by dotted name of the parameter; broadcast, DataArrays by dimension name.
     threads : int, optional
-        All cores unless given.
+        Number of threads; by default that of all cores.
     progress : bool, optional
-        Whether to show a progress bar; on a terminal unless given.
+        True to show a progress bar; by default on a terminal only.
 
     Returns
     -------
     ndarray or xarray.DataArray
-        Sizes without unit, as in `Threshold`: 0 where steady sliding is unstable, inf where no kick in the
-        range fails, NaN where there is no steady sliding, and where kicks over more than a tenth of the size are
-        undecided (`Threshold` of a single rig says more). After Ctrl-C, NaN too where nothing is known yet, and the
-        middle of the bracket reached where something is. A DataArray has a coordinate ``limit`` beside it: what comes
-        of larger kicks, ``edge``, ``unstable``, ``no steady sliding``, ``out of range`` (of floating point) or
-        ``undecided`` with the reason; ``returns`` where none fails. Of machines another, ``contact``: that which
-        is lost beyond, or fastest in a blow-up. Dimensions have ``units`` and ``long_name`` of the parameter that
-        varies along them.
+        Dimensionless sizes, as `Threshold.size`: 0 where steady sliding is unstable, inf where no kick in the range
+        fails, NaN where there is no steady sliding, and where kicks over more than a tenth of the size are undecided
+        (see `threshold` for a single rig). After Ctrl-C, NaN too where no kick is known to fail, else the middle of the
+        bracket reached. A DataArray has a coordinate ``limit``: the outcome of larger kicks, or ``edge``, ``unstable``,
+        ``no steady sliding``, ``out of range`` (of floating point) or ``undecided`` with the reason; ``returns`` where
+        none fails. For machines a coordinate ``contact``: the one that is lost beyond, or fastest in a blow-up.
+        Dimensions have ``units`` and ``long_name`` of the parameter that varies along them.
 
     Examples
     --------
@@ -130,19 +128,19 @@ def threshold_map(
     beside = {"limit": (dims, np.array(BEYOND)[found.beyond])}
     if rig.contact_names:
         beside["contact"] = (dims, found.contact)
-    made = xr.DataArray(found.size, dims=dims, coords={**coords, **beside}, name=f"{kick}_threshold", attrs=about)
-    return made.assign_coords({dim: made[dim].assign_attrs(own) for dim, own in _axes(made, rig, vary).items()})
+    array = xr.DataArray(found.size, dims=dims, coords={**coords, **beside}, name=f"{kick}_threshold", attrs=about)
+    return array.assign_coords({dim: array[dim].assign_attrs(own) for dim, own in _axes(array, rig, vary).items()})
 
 
-def _axes(made: Any, rig: Slider | Machine, vary: Mapping[str, Any]) -> dict[str, dict[str, str]]:
-    """Unit and words with letter of dimensions whose coordinate has the values of a parameter; what is given stays."""
+def _axes(array: Any, rig: Slider | Machine, vary: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Attributes ``units`` and ``long_name`` of dimensions along which a parameter varies; present ones are kept."""
     found = {}
     for given, values in vary.items():
         for dim in getattr(values, "dims", ()):
-            if dim in made.coords and np.array_equal(values, made[dim]):
+            if dim in array.coords and np.array_equal(values, array[dim]):
                 name = rig.resolve(given)
                 own = {"units": rig.parameters()[name].role.unit, "long_name": label_of(rig, name)}
-                found[dim] = own | dict(made[dim].attrs)
+                found[dim] = own | dict(array[dim].attrs)
     return found
 
 
@@ -161,7 +159,7 @@ def threshold_brackets(
     progress: bool | None = None,
     branch: int = 0,
 ) -> tuple[Brackets, Any, Any]:
-    """Brackets of `threshold_map` as plain arrays, then the names of dimensions and the coordinates of DataArrays."""
+    """Brackets of `threshold_map` as plain arrays, and names of dimensions and coordinates if DataArrays are varied."""
     flat, _, together = broadcast_arrays(rig, Protocol(), vary, {})
     shape = together.shape
     size = int(np.prod(shape, dtype=int))
@@ -188,8 +186,8 @@ class _Search:
         self.stable, self.exists = (np.broadcast_to(a, (count,)) for a in (kicked.stable, kicked.exists))
         self.rig = np.arange(count) if kicked.size > 1 else np.zeros(count, dtype=int)
         self.low, self.high = np.zeros(count), np.full(count, np.inf)
-        self.doubt = np.full((count, 2), np.nan)  # ends of what is undecided inside the bracket,
-        self.why = np.full(count, UNDECIDED)  # and why
+        self.doubt = np.full((count, 2), np.nan)  # smallest and largest undecided size inside the bracket
+        self.why = np.full(count, UNDECIDED)  # undecided outcome, index into `OUTCOMES`
         absent = np.where(np.broadcast_to(kicked.jobs.in_range, (count,)), ABSENT, BEYOND_FLOATS)
         self.beyond = np.where(self.exists, np.where(self.stable, INTERRUPTED, UNSTABLE), absent)
         self.whole = True
@@ -217,7 +215,7 @@ class _Search:
             self._tried(wide, point)
 
     def _next(self, precision: float) -> tuple[Array, Array]:
-        """Next sizes to try for the rigs whose brackets are too wide: the middle, or beside an undecided size."""
+        """Next sizes and indices of the rigs whose brackets are too wide: the middle, or beside undecided sizes."""
         low, high, (left, right) = self.low, self.high, self.doubt.T
         with np.errstate(invalid="ignore"):
             clear = np.isnan(left)
@@ -230,7 +228,7 @@ class _Search:
         return point[wide], wide
 
     def _tried(self, which: Array, sizes: Array) -> Array:
-        """Simulate kicks of rigs `which` and update their brackets; True for each rig without a failing kick so far."""
+        """Simulate a kick of each rig `which` (k,) and update its bracket; True (k,) where the kick does not fail."""
         if not len(which):
             return np.zeros(0, dtype=bool)
         found = self.kicked.outcomes(self.rig[which], sizes, self.threads, self.advanced, effort=1.0)
@@ -251,7 +249,7 @@ class _Search:
         return np.asarray(~failed & (found != INTERRUPTED))
 
     def result(self) -> tuple[Array, Array, Array, Array, Array]:
-        """Threshold, lower and upper bound, limiting outcome and contact of every rig."""
+        """Threshold, ends of the bracket, limit (index into `BEYOND`) and contact of every rig, arrays (rigs,)."""
         with np.errstate(invalid="ignore"):
             middle = np.where(self.beyond == EDGE, self.high, 0.5 * (self.low + self.high))
             known = np.isfinite(self.high) & (~self.whole | (self.high - self.low <= WIDE * self.high))

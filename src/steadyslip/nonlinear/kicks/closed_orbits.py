@@ -2,11 +2,10 @@
 
 Orbits of one slip event, or one turn, are searched here; longer ones by `orbits.cycle_from_motion`, run by run.
 
-The flow over one period and its derivative come from runs side by side: one from the state itself, two for each
-variable beside it (central differences). That is coarser than the variational equations of `flow`, enough to tell
-attraction from repulsion, and it needs no other kernel than the runs themselves. That is why this Newton's method
-stands beside that of `orbits.shooting`: it solves for dozens of runs in lanes, where that compiles a kernel with
-sensitivities for each model and takes one cycle after another.
+The flow over one period and its derivative are computed by runs side by side: one from the state itself, and two for
+each variable (central differences). That is less accurate than the variational equations of `orbits.flow`, but enough
+to distinguish attraction from repulsion, and it uses the kernel of the runs. `orbits.shooting` would compile a kernel
+with sensitivities for each model and solve for one cycle at a time; here dozens are solved for together.
 """
 
 from __future__ import annotations
@@ -22,22 +21,22 @@ from steadyslip.nonlinear.kicks.spans import MotionBatch, advanced_runs, constan
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.flow import FlowRunner
 
-BESIDE = 1e-4  # distance of neighbouring runs for differences, natural sizes
-ROUNDS = 8  # Newton iterations
-CLOSED = 1e-6  # distance after a period below which an orbit is closed, natural sizes,
-LOOSE = 1e3  # or this many integration tolerances
+BESIDE = 1e-4  # step of finite differences, natural sizes
+ROUNDS = 8  # limit of Newton iterations
+CLOSED = 1e-6  # distance after a period below which an orbit is closed, natural sizes
+LOOSE = 1e3  # as CLOSED, in integration tolerances, if that is more
 ATTRACTS = 1e-3  # distance of multipliers from 1 that finite differences resolve
 WORTH = 0.1  # error of the trivial multiplier above which the others are not used
-ON = 0.05  # distance of the run from the orbit, in sizes of the orbit, up to which its multipliers apply
-PRECISE = 0.01  # allowed error of the orbit, as a share of its size
-AWAY = 1e-3  # distance from steady sliding below which a closed orbit cannot be told from it
+ON = 0.05  # largest distance of the run from the orbit, over the orbit's size
+PRECISE = 0.01  # allowed error of the orbit over its size
+AWAY = 1e-3  # distance from steady sliding, natural sizes, below which a closed orbit is not distinguished from it
 DONE = STATUSES.index("done")
 
 
 def on_long_cycle(runs: MotionBatch, one: int, state: Array, unknowns: Array) -> bool:
     """True if one run, now at `state` (n,), is on an attracting cycle of several slip events or turns.
 
-    `unknowns` (u,) are those of the balances there, NaN where they are not known.
+    `unknowns` (u,) solve the algebraic equations at `state`, NaN where they are not known.
     """
     which, rest = np.array([one]), runs.rest
     inputs = constant_inputs(
@@ -50,7 +49,7 @@ def on_long_cycle(runs: MotionBatch, one: int, state: Array, unknowns: Array) ->
 
 @dataclass
 class _Turn:
-    """One period of k runs: where it ends (k, n) and its derivative (k, n, n), in natural sizes."""
+    """One period of k runs: final state (k, n) and its derivative in the initial one (k, n, n), natural sizes."""
 
     end: Array
     derivative: Array
@@ -60,10 +59,10 @@ class _Turn:
 def attracted(
     runs: MotionBatch, which: Array, states: Array, unknowns: Array, period: Array, threads: int | None = None
 ) -> tuple[Array, Array]:
-    """True (k,) for runs `which`, now at `states` (k, n), on an attracting closed orbit of about `period` (k,) s.
+    """True (k,) for runs on an attracting closed orbit, and True (k,) for runs close to any closed orbit.
 
-    And whether a period later they are where they were, but for a little: on any closed orbit, or close to one.
-    `unknowns` (k, u) are those of the balances there, NaN where they are not known.
+    Runs `which` (k,) are at `states` (k, n), orbits have about the `period` (k,), s. `unknowns` (k, u) solve the
+    algebraic equations at the states, NaN where they are not known.
     """
     rest = runs.rest.part(which)
     scale, n = rest.scales, states.shape[1]
@@ -119,7 +118,7 @@ def attracted(
 def _turned(
     runs: MotionBatch, which: Array, states: Array, unknowns: Array, scale: Array, period: Array, threads: int | None
 ) -> _Turn:
-    """Integrate one period from k states; its derivative by central differences."""
+    """One period from k states, with derivatives by central differences."""
     count, n = states.shape
     beside = BESIDE * np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)])  # (2n+1, n)
     many = (states[:, None, :] + scale[:, None, :] * beside[None]).reshape(-1, n)
@@ -134,9 +133,9 @@ def _turned(
 def _attraction(derivative: Array, ahead: Array) -> Array:
     """Distance inside the unit circle of all multipliers but the trivial one, (k,); 0 if uncertain.
 
-    `ahead` (k, n) are the rates. That direction, which the flow carries into itself, is split off first: beside it a
-    second multiplier near one would be a double one, and lose half of its digits. How well it is met tells what
-    finite differences are worth here.
+    `ahead` (k, n) are the rates. Their direction, which the flow maps to itself, is deflated first: together with the
+    trivial multiplier, another one near 1 would be a double one and lose half of its digits. The error of the trivial
+    multiplier estimates that of the finite differences.
     """
     found = np.zeros(len(derivative))
     for i, (matrix, rate) in enumerate(zip(derivative, ahead, strict=True)):

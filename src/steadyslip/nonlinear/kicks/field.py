@@ -1,4 +1,4 @@
-"""Equations of motion at constant inputs: rates, slip rates and normal stresses at given states."""
+"""Equations of motion at constant inputs: rates, slip rates and normal stresses as functions of the state."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from steadyslip.model.scales import natural_scales
 from steadyslip.motion.single import areas as areas_of
 from steadyslip.nonlinear.kicks.rest import Rest, in_columns
 
-ROUNDING = 1e-14  # relative rounding error of stresses, in units of the normal stress
-BALANCED = 12  # largest number of Newton iterations for the balance of forces
+ROUNDING = 1e-14  # rounding error of stresses over the normal stress
+BALANCED = 12  # limit of Newton iterations for the balance of forces
 
 
 @cached
 def field_of(reduction: Reduction) -> ArrayFunction:
-    """Function of rates and slip rates, then residuals of the force balances and their slopes, row by row (cached).
+    """Compiled function that returns rates, slip rates, residuals of the force balances and their Jacobian (cached).
 
-    A function of the parameters, σss, v_lp, q, p, the state and the unknowns.
+    Its arguments are the parameters, σss, v_lp, q, p, the state and the unknowns.
     """
     slopes = [entry for row in reduction.solved.matrix for entry in row]
     speeds = (one.outputs["v"] for one in reduction.slidings)
@@ -31,12 +31,12 @@ def field_of(reduction: Reduction) -> ArrayFunction:
 
 @cached
 def _jacobian_of(reduction: Reduction) -> ArrayFunction:
-    """Function of the Jacobian of the rates (cached)."""
+    """Compiled function that returns the Jacobian of the rates, row by row (cached)."""
     return _at_constant_inputs(reduction, [entry for row in reduction.jacobian() for entry in row])
 
 
 def _at_constant_inputs(reduction: Reduction, expressions: list[sp.Expr]) -> ArrayFunction:
-    """Compile expressions with the derivatives of the inputs set to zero."""
+    """Compiled function of expressions with the derivatives of the inputs set to zero."""
     still = dict.fromkeys((TIME, *reduction.slopes), sp.Integer(0))
     at_rest = (sp.sympify(e).xreplace(still) for e in expressions)
     return reduction.model.function(at_rest, V_LP, Q, P, *reduction.state, *reduction.unknowns)
@@ -54,8 +54,8 @@ def motion_at(rest: Rest, states: Array) -> tuple[Array, Array]:
 
 
 def solved_at(rest: Rest, states: Array) -> tuple[Array, Array, Array]:
-    """Rates, slowest slip rate, and unknowns of the force balances (m, d, u), at states (m, d, n)."""
-    given = [rest.column(np.asarray(a)) for a in rest.given()]
+    """Rates (m, d, n), slowest slip rate (m, d), and unknowns of the force balances (m, d, u), at states (m, d, n)."""
+    given = [rest.column(np.asarray(a)) for a in rest.arguments()]
     function, split, n = field_of(rest.reduction), np.moveaxis(states, 2, 0), states.shape[2]
     shape, count, speeds = states.shape[:2], len(rest.reduction.unknowns), len(rest.reduction.slidings)
     unknowns = np.array(np.broadcast_to(rest.unknowns[:, None, :], (*shape, count)))
@@ -65,19 +65,19 @@ def solved_at(rest: Rest, states: Array) -> tuple[Array, Array, Array]:
             numbers = np.stack([np.broadcast_to(np.asarray(one, dtype=float), shape) for one in found], axis=2)
             if count:
                 residuals, slopes = numbers[..., n + speeds : n + speeds + count], numbers[..., n + speeds + count :]
-                change, feels = _newton(residuals, slopes.reshape(*shape, count, count))
+                change, sensitivity = _newton(residuals, slopes.reshape(*shape, count, count))
                 unknowns = unknowns - change
         moving = numbers[..., n : n + speeds].min(axis=2)
         rates = numbers[..., :n]
         if count:
-            rounding = ROUNDING * feels * _forces(rest)[:, None, None]  # much where mass is small
+            rounding = ROUNDING * sensitivity * _forces(rest)[:, None, None]  # large where mass is small
             settled = np.abs(change) <= 1e-10 * (np.abs(unknowns) + _sizes(rest)[:, None, :]) + rounding
             rates = np.where(np.all(settled, axis=2)[..., None], rates, np.nan)
     return rates, moving, unknowns
 
 
 def _newton(residuals: Array, slopes: Array) -> tuple[Array, Array]:
-    """Newton corrections of the unknowns (m, d, u), and their sensitivity to a force."""
+    """Newton corrections of the unknowns (m, d, u), and bounds (m, d, u) of their change per unit of all residuals."""
     if residuals.shape[-1] == 1:
         return residuals / slopes[..., 0], 1 / np.abs(slopes[..., 0])
     good = np.all(np.isfinite(slopes), axis=(-2, -1)) & (np.linalg.det(slopes) != 0)
@@ -94,7 +94,7 @@ def _forces(rest: Rest) -> Array:
 
 
 def _sizes(rest: Rest) -> Array:
-    """Natural sizes of the unknowns, (m, u): of velocity variables, accelerations, or frictions."""
+    """Natural sizes (m, u) of the unknowns, which are velocity variables, accelerations or frictions."""
     count = len(rest.reduction.unknowns)
     if rest.is_machine:
         return in_columns(natural_scales(rest.point, rest.reduction)[1][:count], len(rest.velocity))
@@ -123,14 +123,14 @@ def normal_stresses(rest: Rest, state: Array, unknowns: Array) -> Array:
 
 def slip_rates_at(rest: Rest, state: Array, unknowns: Array) -> Array:
     """Slip rates (m, contacts), m/s, at states (m, n) and unknowns (m, u), one for each rig."""
-    found = field_of(rest.reduction)(*rest.given(), *state.T, *unknowns.T)
+    found = field_of(rest.reduction)(*rest.arguments(), *state.T, *unknowns.T)
     n = state.shape[1]
     return in_columns(found[n : n + len(rest.reduction.slidings)], len(state))
 
 
 @cached
 def _normal_of(reduction: Reduction) -> ArrayFunction:
-    """Function of the normal stresses of all contacts (cached)."""
+    """Compiled function that returns the normal stresses of all contacts (cached)."""
     still = dict.fromkeys((TIME, *reduction.slopes), sp.Integer(0))
     wanted = (one.outputs["sigma"].xreplace(still) for one in reduction.slidings)
     return reduction.model.function(wanted, V_LP, Q, P, *reduction.state, *reduction.unknowns)

@@ -1,7 +1,7 @@
 """Folds of the force balance: states beyond which a massless block has no continuous motion.
 
-Velocity is what balances forces. Where friction falls when the block speeds up, two such velocities may meet and vanish
-as the state changes; beyond, the block would have to jump to another one far away.
+The velocity of a massless block solves the balance of forces. Where friction falls with velocity, two solutions may
+merge and vanish as the state changes; beyond, velocity would have to jump to a solution far away.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from steadyslip.core.arrays import Array
 from steadyslip.nonlinear.kicks.field import field_of
 from steadyslip.nonlinear.kicks.rest import Rest
 
-REACH = 60.0  # range of ln(velocity/drive), to both sides, in which a fold is searched for,
-COUNT = 2401  # at this many velocities first
+REACH = 60.0  # range of ln(velocity/drive), to both sides of 0, in which a fold is searched for
+COUNT = 2401  # number of velocities in the first scan of that range
 BISECTIONS = 60  # halve 2 REACH/COUNT down to rounding
-NEAR = 1e-7  # largest residual force, as a share of the normal stress, at a state on a fold,
-CLOSE = 1e-3  # and largest difference of ln(velocity/drive), where the state's own velocity is known
+NEAR = 1e-7  # largest residual force over the normal stress at a fold
+CLOSE = 1e-3  # largest difference of ln(velocity/drive) between the state and a fold
 
 
 def at_fold(rest: Rest, states: Array, unknowns: Array | None = None) -> Array:
     """True (m,) for states (m, n), one for each rig, at which two velocities that balance the forces merge.
 
-    `unknowns` (m, 1) are those of the balance at the states, NaN where they are lost: next to a fold forces may balance
-    at a velocity that is not at it.
+    `unknowns` (m, 1) are the velocity variables at the states, NaN where unknown: near a fold forces may also balance
+    at another velocity.
     """
     if not rest.reduction.unknowns or rest.reduction.model.inertial or not rest.reduction.model.is_single:
         return np.zeros(len(states), dtype=bool)
@@ -46,8 +46,8 @@ def at_fold(rest: Rest, states: Array, unknowns: Array | None = None) -> Array:
 
 
 def _balance(rest: Rest, states: Array, turns: Array) -> tuple[Array, Array]:
-    """Residual force at velocities (m, k), given as asinh or ln, and its derivative."""
-    given = [rest.column(np.asarray(number)) for number in rest.given()]
+    """Residual force (m, k) and its derivative at velocities `turns` (m, k): asinh or ln of velocity over drive."""
+    given = [rest.column(np.asarray(number)) for number in rest.arguments()]
     unknown = turns
     if rest.reduction.velocity == "linear":
         unknown = rest.velocity[:, None] * np.sinh(turns)

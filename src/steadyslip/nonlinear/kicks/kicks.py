@@ -1,7 +1,7 @@
 """Kicks (sudden disturbances of steady sliding at time zero): their kinds, sizes, and the motions after them.
 
-A kick has a size without unit, from nothing upwards; all of them change the state or the inputs once, after which
-the inputs are constant, so that one kernel runs them all.
+The size of a kick is dimensionless and positive. A kick changes the state or the inputs once, after which the inputs
+are constant, so that one kernel integrates the motions after all kinds of kick.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import STIFF, MotionBatch, StepBudget, continuous_at
 
-PATIENCE = 5.0  # factor of time, against that in a scan, for which single motions are followed
+PATIENCE = 5.0  # factor on the longest simulated time, against that in a scan, for motions near the threshold
 
 
 @dataclass(frozen=True)
@@ -43,14 +43,15 @@ class Kick:
     ----------
     name : str
     unit : str
-        Of `amount`.
+        SI unit of the amount of a kick.
     low, high, most : float
-        Range of sizes that is searched unless told, and how far it can be.
+        Range of sizes that is searched by default, and the largest that can be.
     size : str
-        What a size without unit counts.
+        Definition of the dimensionless size.
     doc : str
+        Description for lists of kicks.
     usual : bool
-        True if it is tried where none is named.
+        True if the kick is tried by default.
     """
 
     name: str
@@ -82,21 +83,21 @@ OF_MACHINES = {
         replace(KICKS["impulse"], unit="N s", size="change of velocity over its own", doc="blow on a body with mass"),
     )
 }
-"""Kicks of machines; those at a body or contact name it."""
+"""Kinds of kick of machines, by name."""
 
 
 def kicks_of(rig: Slider | Machine) -> dict[str, Kick]:
-    """Kinds of kick that a rig can get."""
+    """Kinds of kick for a rig, by name."""
     return OF_MACHINES if rig.in_forces else KICKS
 
 
 def kick_problems(rig: Slider | Machine, kick: str, at: str | None = None) -> list[Problem]:
-    """Problems with the kind and the place of a kick, as a list for error messages.
+    """Problems with the kind of a kick and with the body or contact `at`, as a list for error messages.
 
     Raises
     ------
     NotAvailable
-        If it would be an infinite force.
+        If the kick would need an infinite force.
     """
     known = kicks_of(rig)
     if kick not in known:
@@ -108,45 +109,44 @@ def kick_problems(rig: Slider | Machine, kick: str, at: str | None = None) -> li
 
 
 def options_for(model: Model, rtol: float | None) -> Options:
-    """Integration options of kicked motion: a larger tolerance with mass or bristles, which need an implicit method.
+    """Integration options for motions after kicks: rtol 1e-10, or 1e-8 with mass or bristles (implicit method).
 
-    Rounding in the force of stiff bristles is more than the finer tolerance allows.
+    Rounding in the force of stiff bristles exceeds the finer tolerance.
     """
     stiff = automatic_method(reduce_model(model)) == STIFF
     return Options(rtol=rtol or (1e-8 if stiff else 1e-10), most_steps=400_000)
 
 
 class Kicked:
-    """One rig or many, with a kind of kick, from which motions after kicks are prepared.
+    """One rig or many, with one kind of kick: prepares and simulates motions after kicks of any size.
 
     Parameters
     ----------
     rig : Slider or Machine
     kick : str
-        A name in `kicks_of` the rig.
+        A key of ``kicks_of(rig)``.
     at : str or None
         Of a machine: the body or contact that is kicked; None for its drive.
     direction : int
-        1 or -1: faster, forward, pressed harder; or the reverse.
+        1: faster, forward, pressed harder; -1: the reverse.
     reference : str
-        For ``velocity``: ``before`` if the rig's drive is the velocity before the step, ``after`` if it is
-        the velocity after it. Everything the rig says of itself, such as a steady normal stress, holds at its drive.
+        For ``velocity``: ``before`` if the rig's drive velocity is that before the step, ``after`` if it is that after
+        it. The rig's parameters, such as a steady normal stress, refer to its drive velocity.
     vary : mapping of str to ndarray
         Parameters of the rig, flat arrays of equal length.
     up_to : float or None
-        Largest size of interest; the `Kick.high` of its kind unless given.
+        Largest size that is searched; by default `Kick.high`.
 
     Attributes
     ----------
     size : int
         Number of rigs.
     rest : Rest
-        The rigs' own steady sliding.
+        Steady sliding of the rigs before kicks.
     exists, neutral, stable : ndarray of bool (size,)
-        Whether there is steady sliding; whether small motions about it neither grow nor decay; whether they decay
-        or are neutral.
+        True if steady sliding exists; if small motions about it neither grow nor decay; if they do not grow.
     budget : StepBudget
-        Of all motions that are run.
+        Integration steps left for all motions.
     """
 
     def __init__(
@@ -196,7 +196,7 @@ class Kicked:
 
     @property
     def highest(self) -> float:
-        """Largest size that is searched: as told, or the usual; what would stop or lift the body is left out."""
+        """Largest size that is searched: `up_to` or the default, but below sizes that stop or lift the body."""
         usual, stops = KICKS["impulse"].high if self._is_blow else self.kick.high, np.inf
         if self._is_blow:
             stops = largest_blow(self.jobs, self.at, self.sign * self.body_speed)
@@ -206,11 +206,11 @@ class Kicked:
 
     @property
     def _is_blow(self) -> bool:
-        """True if the kick changes the velocity of a body at once."""
+        """True if the kick is a jump of the velocity of a body."""
         return self.kick.name == "impulse" or (self.kick.name == "velocity" and not self.of_drive)
 
     def amount(self, size: Any, which: Any = slice(None)) -> Array:
-        """Kick in SI units, signed: for a velocity kick the change beside the drive, else the change of the input."""
+        """Signed amount of kicks in SI units: for a velocity step of the drive the new velocity, else the change."""
         size = np.asarray(size, dtype=float)
         with np.errstate(over="ignore"):
             if self.kick.name == "velocity" and self.of_drive:
@@ -219,13 +219,13 @@ class Kicked:
             return np.asarray(self.sign * size * self.units[which])
 
     def size_of(self, amount: float) -> float:
-        """The size of a kick given in SI units (of the first rig); negative if against `direction`."""
+        """Dimensionless size of an amount in SI units (for the first rig); negative if against `direction`."""
         if self.kick.name == "velocity" and self.of_drive:
             sign = -self.sign if self.from_other else self.sign
             return float(sign * np.log(amount / self.drive[0]))
         return float(self.sign * amount / self.units[0])
 
-    # -- where kicks lead
+    # -- motions after kicks
 
     @property
     def moves_rest(self) -> bool:
@@ -235,7 +235,7 @@ class Kicked:
         return self.kick.name in ("normal-stress", "normal-force", "force")
 
     def inputs(self, which: Array, sizes: Array) -> tuple[Array, Array, Array]:
-        """Load-point velocity, added normal stress and force after kicks (n,)."""
+        """Load-point velocity, added normal stress and force after kicks, each (n,), SI units."""
         velocity, nothing = self.drive[which], np.zeros(len(which))
         if not self.moves_rest:
             return velocity, nothing, nothing
@@ -280,7 +280,7 @@ class Kicked:
         self, which: Array, sizes: Array, threads: int | None = None,
         advanced: Callable[[int], None] | None = None, effort: float = PATIENCE,
     ) -> Array:  # fmt: skip
-        """Outcomes of kicks as indices into `OUTCOMES`, (n,); see `MotionBatch` for `effort`."""
+        """Outcomes (n,) of kicks `sizes` of rigs `which`, as indices into `OUTCOMES`; `effort` as in `MotionBatch`."""
         return outcomes_of(self.runs(which, sizes, effort), threads, advanced)
 
     def contacts(self, which: Array, sizes: Array, threads: int | None = None) -> Array:
@@ -288,7 +288,7 @@ class Kicked:
         return contacts_of(self.runs(which, sizes), np.arange(len(which)), threads)
 
     def _jobs(self, which: Array) -> Jobs:
-        """The rigs `which` in steady sliding."""
+        """Jobs of the rigs `which` that start in steady sliding."""
         return replace(
             self.jobs, point=self.jobs.point.part(which), initial=picked(self.jobs.initial, which),
             velocity=picked(self.jobs.velocity, which), size=len(which),

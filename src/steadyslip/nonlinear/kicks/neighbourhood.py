@@ -1,20 +1,19 @@
 """Compute a ball around steady sliding from which all motion returns to it.
 
 With y = y0 + B q, the columns of B the modes of the linearisation, V = |q|² is a Lyapunov function of the linearised
-motion. It is one of the motion itself wherever V' < 0, and a ball of V on and in which this holds is never left and
-leads to steady sliding. The largest such ball is looked for: V' is computed from the full rates on
-shells, in many directions, and must everywhere be at least half of what the linearisation gives. The half is the margin
-for what lies between the directions. It relies on rates that are smooth, so the ball ends before the block stops: laws
-may have a kink there (the bristles of LuGre).
+motion. If V' < 0 on and in a ball |q| < r for the full motion too, no motion leaves the ball, and all motion in it
+converges to steady sliding. The largest such ball is searched for: V' is computed from the full rates on shells, in
+many directions, and must everywhere be at least half of its linear value. The half is a margin for values between the
+directions. This relies on smooth rates, so the ball ends before the block stops, where laws may have a kink (the
+bristles of LuGre).
 
-Modes that decay fast are followed by the slow ones with a lag that grows like the square of the distance; in a plain
-ball this alone would make V' positive at tiny distances (with mass rates differ by ten decades). Modes are therefore
-weighted by the square root of their decay times. For the same reason V' changes from direction to direction most
-steeply next to the slow modes, where little of the fast ones decides its sign; directions are spread there too, as
-evenly as V' sees them.
+Fast modes follow the slow ones with a lag that grows like the square of the distance; in a plain ball this alone would
+make V' positive at tiny distances (with mass, rates differ by ten decades). Modes are therefore weighted by the square
+root of their decay times. For the same reason V' varies most between directions close to the slow modes, where a small
+share of fast modes decides its sign; a part of the directions is concentrated there.
 
-Where modes ring on almost undamped such balls are tiny. Near them, V = |q|² + V3 + V4 (`quartic`)
-takes the place of |q|², and a level of V that of the radius.
+Where modes are almost undamped these balls are tiny. Then V = |q|² + V3 + V4 (`quartic`) is used in place of |q|², and
+a level of V in place of the radius.
 """
 
 from __future__ import annotations
@@ -29,12 +28,12 @@ from steadyslip.nonlinear.kicks.field import motion_at
 from steadyslip.nonlinear.kicks.quartic import REACH, Rays, terms
 from steadyslip.nonlinear.kicks.rest import Rest
 
-LARGEST, SMALLEST = 4.0, 1e-12  # radius, in natural sizes of the weakest mode
+LARGEST, SMALLEST = 4.0, 1e-12  # limits of the radius, in natural sizes of the slowest mode
 SHRINK = 0.6  # factor between successive trial radii
-LONG = 30.0  # ratio of slip to all else, in natural sizes, above which a mode is scaled by all else
-SPREAD = (0.0, 0.25, 0.5)  # powers of the decay times' ratio by which fast modes are lessened in a third of directions
-INNER = (0.75, 0.5, 0.25, 0.1)  # radii of inner shells that are checked too, as shares of the ball's
-FEW = 8  # share of the directions in which balls and levels are tried first
+LONG = 30.0  # ratio of slip to other variables, in natural sizes, above which a mode is scaled by the latter
+SPREAD = (0.0, 0.25, 0.5)  # a third of directions each: powers of decay time by which fast modes are reduced
+INNER = (0.75, 0.5, 0.25, 0.1)  # radii of inner shells that are checked too, over the ball's
+FEW = 8  # every 8th direction is tried first
 MARGIN = 0.5  # required share of the linear decay of V
 
 
@@ -48,9 +47,9 @@ class Neighbourhood:
     Attributes
     ----------
     radius : ndarray (m,)
-        In the norm of q; 0 where steady sliding is not stable or no ball was found, NaN where nobody has asked yet.
+        Radius |q| of the ball; 0 where steady sliding is not stable or no ball was found, NaN where not computed yet.
     levels : dict of int to list
-        Of rigs by their number in `key`, as far as anyone has asked: V3, V4, and the root of the level of V.
+        V3, V4 and the root of the level of V, by the rig's number in `key`, as far as computed.
     """
 
     def __init__(self, rest: Rest) -> None:
@@ -71,11 +70,11 @@ class Neighbourhood:
         return found
 
     def computed(self, which: Array | None = None) -> Array:
-        """Radii (in q) of some rigs; of all unless given."""
+        """Radii |q| (k,) of rigs `which` (k,), by default all, computed where they are not known yet."""
         which = np.arange(len(self.radius)) if which is None else which
-        asked = np.unique(which[np.isnan(self.radius[which])])
-        for start in range(0, len(asked), 512):
-            piece = asked[start : start + 512]
+        missing = np.unique(which[np.isnan(self.radius[which])])
+        for start in range(0, len(missing), 512):
+            piece = missing[start : start + 512]
             self.basis[piece], self.inverse[piece], self.decay[piece], good = modes(self.rest.part(piece))
             self.radius[piece[~good]] = 0.0
             piece = piece[good]
@@ -84,14 +83,14 @@ class Neighbourhood:
         return np.asarray(self.radius[which])
 
     def coordinates(self, which: Array, states: Array) -> Array:
-        """q of states (k, n) of rigs `which` (k,)."""
+        """Coordinates q (k, n) of states (k, n) of rigs `which` (k,)."""
         rest = self.rest
         with np.errstate(all="ignore"):
             away = (states - rest.state[which]) / rest.scales[which]
             return np.asarray(np.einsum("kij,kj->ki", self.inverse[which], away))
 
     def around(self, which: Array) -> Array:
-        """Unit vectors of q (k, d, n) along which the motion of rigs `which` (k,) is checked."""
+        """Unit vectors of q (k, d, n) along which V' of rigs `which` (k,) is checked."""
         decay = self.decay[which]
         lessened = (np.min(decay, axis=1)[:, None] / decay)[:, None, :]
         even = directions(decay.shape[1])[None]
@@ -99,16 +98,16 @@ class Neighbourhood:
         return np.asarray(found / np.linalg.norm(found, axis=2)[:, :, None])
 
     def distance(self, which: Array, states: Array) -> Array:
-        """Distance |q| of states (k, n) of rigs `which` (k,) from steady sliding; meaningless beyond the radius."""
+        """Distance |q| (k,) of states (k, n) of rigs `which` from steady sliding; inf where it is not finite."""
         with np.errstate(all="ignore"):
             found = np.linalg.norm(self.coordinates(which, states), axis=1)
         return np.asarray(np.where(np.isfinite(found), found, np.inf))
 
     def holds(self, which: Array, states: Array, steps: Array | float = 0.0) -> Array:
-        """True (k,) for states (k, n) of rigs `which` inside their balls, or where V has not reached its level.
+        """True (k,) for states (k, n) of rigs `which` inside their balls, or where V is below its level.
 
-        A level costs as much as about n⁴ integration steps. It is computed where several of the motions need it, or
-        where the `steps` (k,) that one has taken are as many; until then such a motion counts as outside.
+        A level costs as much as about n⁴ integration steps. It is computed if several of the motions need it, or if one
+        has taken as many `steps` (k,); until then a motion outside the ball counts as outside.
         """
         radius, away = self.computed(which), self.distance(which, states)
         inside = np.asarray(away < radius)
@@ -122,7 +121,7 @@ class Neighbourhood:
         return inside
 
     def _below(self, which: Array, states: Array) -> Array:
-        """True (k,) where V is below its level, which is computed for rigs of which nobody has asked yet."""
+        """True (k,) where V is below its level, which is computed for rigs where it is not known yet."""
         keys, first = np.unique(self.key[which], return_index=True)
         new = np.array([key not in self.levels for key in keys])
         if new.any():
@@ -135,7 +134,7 @@ class Neighbourhood:
         return np.asarray((rays.value(rho[:, None])[:, 0] < size**2) & (rho < rays.farthest[:, 0]))
 
     def _levels(self, which: Array) -> tuple[Array, Array, Array]:
-        """Terms of V, and the root of the level below which it falls; 0 where the ball reaches farther."""
+        """V3, V4, and the root of the level of V below which it falls; 0 where the ball is larger."""
         v3, v4 = terms(self.rest.part(which), self.basis[which], self.inverse[which])
         known = np.all(np.isfinite(v3), axis=(1, 2, 3)) & np.all(np.isfinite(v4), axis=(1, 2, 3, 4))
         size, around = np.where(known, LARGEST, 0.0), self.around(which)
@@ -151,7 +150,7 @@ class Neighbourhood:
         return v3, v4, size
 
     def _radii(self, which: Array) -> Array:
-        """Radii of the balls."""
+        """Radii |q| (k,) of the balls of rigs `which` (k,)."""
         size, around = np.full(len(which), LARGEST), self.around(which)
         for ways in (around[:, ::FEW], around):
 
@@ -163,21 +162,21 @@ class Neighbourhood:
         return size
 
     def _falls(self, which: Array, q: Array, gradient: Array) -> Array:
-        """True (k,) where V falls at least `MARGIN` times as fast as |q|² does linearly, at all q (k, d, n)."""
+        """True (k,) where V falls at all q (k, d, n), by at least `MARGIN` times the linear rate of |q|²."""
         rest = self.rest.part(which)
         away = np.einsum("kij,kdj->kdi", self.basis[which], q)
         rates, velocity = motion_at(rest, rest.state[:, None, :] + rest.scales[:, None, :] * away)
         linear = np.einsum("kij,kdj->kdi", self.inverse[which] @ rest.matrix @ self.basis[which], q)
         with np.errstate(all="ignore"):
             back = np.einsum("kij,kdj->kdi", self.inverse[which], rates / rest.scales[:, None, :])
-            slope, asked = np.sum(gradient * back, axis=2), 2 * MARGIN * np.sum(q * linear, axis=2)
-            return np.asarray(np.all((slope < asked) & (velocity > 0), axis=1))
+            slope, bound = np.sum(gradient * back, axis=2), 2 * MARGIN * np.sum(q * linear, axis=2)
+            return np.asarray(np.all((slope < bound) & (velocity > 0), axis=1))
 
 
 def _largest(start: Array, least: Array, falls: Callable[[Array, Array], Array]) -> Array:
-    """Largest sizes (m,) of shells on and inside which V falls, among those that shrink from `start`.
+    """Largest sizes (m,) of shells on and inside which V falls, tried downwards from `start`; 0 if below `least`.
 
-    `falls` says so of some of the m, and of their sizes. Zero where none is as large as `least`.
+    `falls(which, size)` is True (k,) where V falls on the shells of rigs `which` (k,) of given sizes (k,).
     """
     size = start.copy()
     trying = np.flatnonzero(size > 0)
@@ -198,16 +197,17 @@ def _largest(start: Array, least: Array, falls: Callable[[Array, Array], Array])
 def modes(rest: Rest) -> tuple[Array, Array, Array, Array]:
     """Real weighted eigenvectors of stable steady sliding, slowest decay first.
 
-    Natural sizes are those of the state. A mode in which slip changes by many of them before velocity or memory
-    change by one is as long as these allow: slip itself changes forces in proportion.
+    Modes are scaled to unit natural size of the state. A mode with a slip far larger than its velocity and memory is
+    scaled by the latter, as forces are linear in slip.
 
     Returns
     -------
     columns, inverse : ndarray (m, n, n)
+        Modes as columns of a matrix, and its inverse.
     decay : ndarray (m, n)
-        Their rates, 1/s.
+        Decay rates of the modes, 1/s.
     good : ndarray of bool (m,)
-        Where they can be used.
+        True where the modes are finite and well-conditioned.
     """
     roots, vectors = np.linalg.eig(rest.matrix)
     order = np.lexsort((-roots.imag, -roots.real))  # the slowest first
@@ -221,7 +221,7 @@ def modes(rest: Rest) -> tuple[Array, Array, Array, Array]:
     imaginary = np.abs(roots.imag) > 1e-12 * np.abs(roots)
     second = imaginary & (roots.imag < 0)
     decay = -roots.real
-    weight = (np.min(decay, axis=1)[:, None] / decay) ** 0.25  # V weighs q² by the root of the decay time
+    weight = (np.min(decay, axis=1)[:, None] / decay) ** 0.25  # so that V weighs squares by the root of the decay time
     with np.errstate(all="ignore"):
         vectors = vectors / size[:, None, :]
         columns = np.where(second[:, None, :], -vectors.imag, vectors.real) / weight[:, None, :]
@@ -234,7 +234,7 @@ def modes(rest: Rest) -> tuple[Array, Array, Array, Array]:
 
 @lru_cache(maxsize=8)
 def directions(n: int) -> Array:
-    """Unit vectors (count, n), evenly spread over all directions, the axes included."""
+    """Unit vectors (count, n), evenly spread over all directions, with both directions of each axis (cached)."""
     if n == 1:
         return np.array([[1.0], [-1.0]])
     if n == 2:

@@ -1,10 +1,10 @@
 """Decide the outcome of motions under constant inputs, from criteria that are certain.
 
-A motion returns once it is in a computed neighbourhood of steady sliding that is never left (`neighbourhood`); it
-oscillates once it is on a closed orbit that was found and attracts (`closed_orbits`); blow-up and loss of contact are
-seen, and so is that a motion has no continuous solution any further (`fold`). Where steady sliding is unstable nothing
-returns to it, and irregular motion that has gone on for dozens of peaks, none of them higher than those before,
-oscillates too. Any other motion runs on, and after a limit of time it is *undecided*, for a reason in `DOUBTS`.
+A motion returns if it enters a computed neighbourhood of steady sliding that no motion leaves (`neighbourhood`); it
+oscillates if it is on a closed orbit that was found and attracts (`closed_orbits`); blow-up and loss of contact are
+detected in the run, as is the end of continuous solutions (`fold`). Where steady sliding is unstable nothing returns to
+it, and irregular motion that goes on for dozens of peaks without growing counts as oscillation too. Any other motion is
+simulated further, and after the longest simulated time it is *undecided*, for a reason in `DOUBTS`.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ MOST_STEPS = 2_000_000  # integration steps, times the effort, after which a mot
 EARLY, HALFWAY = (
     0.05,
     0.4,
-)  # share of the time allowed after which longer cycles are looked for; where sliding is stable
-AT_ONCE = 1e-12  # share of the first span after which nothing has moved yet
+)  # share of the longest time after which cycles of several events are searched: sliding unstable, stable
+AT_ONCE = 1e-12  # share of the first span in which nothing moves noticeably
 ALIKE = 1e-2  # relative change of the time between slip events below which a cycle is searched for
-PEAKS = 40  # velocity peaks in the last span that irregular motion must have,
-HIGHER = 0.01  # share of ln(velocity/drive) by which these may exceed all before,
-LEFT = 30.0  # growth times of unstable steady sliding for which it must have lasted
+PEAKS = 40  # least number of velocity peaks in the last span of irregular oscillation
+HIGHER = 0.01  # relative excess of ln(velocity/drive) of these peaks over earlier ones that is allowed
+LEFT = 30.0  # least duration of irregular oscillation, growth times of unstable steady sliding
 CODE = {word: number for number, word in enumerate(STATUSES)}
 
 
@@ -58,9 +58,9 @@ def outcomes_of(
     runs: MotionBatch, threads: int | None = None, advanced: Callable[[int], None] | None = None,
     start: Array | None = None,
 ) -> Array:  # fmt: skip
-    """Simulate motions and return outcomes, indices into `OUTCOMES` (m,); from states `start` (m, n) if given.
+    """Outcomes (m,) of simulated motions, indices into `OUTCOMES`; from states `start` (m, n) if given.
 
-    `advanced` is called now and then with the number of further motions decided.
+    `advanced` is called after each span with the number of further motions decided.
     """
     return _Course(runs, threads, start).run(advanced)
 
@@ -68,7 +68,7 @@ def outcomes_of(
 def contacts_of(runs: MotionBatch, which: Array, threads: int | None = None) -> Array:
     """Name of the contact at which each motion loses contact or blows up, (m,); empty for other outcomes.
 
-    They are run once more, to where they end.
+    The motions are simulated again, to their end.
     """
     contacts = runs.rest.reduction.model.contacts
     found = np.full(len(runs.rest.velocity), "", dtype=object)
@@ -94,11 +94,11 @@ class _Course:
     Attributes
     ----------
     found : ndarray of int (m,)
-        Outcomes; OPEN where it is not known yet.
+        Outcomes; OPEN where not decided yet.
     elapsed, span, most : ndarray (m,)
-        Time run so far, length of the next span, and the time after which a motion is undecided, s.
+        Time simulated so far, length of the next span, and longest simulated time, s.
     stiff : ndarray of bool (m,)
-        Whether an explicit method has needed too many steps.
+        True where the explicit method needed too many steps.
     between : ndarray (m,)
         Time between slip events, or peaks, at the end of the last span.
     peak : ndarray (m,)
@@ -121,7 +121,7 @@ class _Course:
         self.explicit = automatic_method(runs.rest.reduction) != STIFF
 
     def run(self, advanced: Callable[[int], None] | None) -> Array:
-        """Simulate until every motion has an outcome; indices into `OUTCOMES`, (m,)."""
+        """Outcomes (m,), indices into `OUTCOMES`: simulates until every motion has one."""
         if not self.started:
             self._return_at_once()
         open_ = np.flatnonzero(self.found == OPEN)
@@ -168,9 +168,9 @@ class _Course:
         return found
 
     def _retried(self, open_: Array, ended: SpanResults) -> Array:
-        """Mark motions for which the explicit method needed too many steps for a repeat; return the others.
+        """Mark motions to be repeated by the implicit method, if the explicit one took too many steps; return the rest.
 
-        A span that too many steps were not enough for has ended where they were used up.
+        If an implicit method took too many steps, the span ends where they were used up.
         """
         many = ended.status == CODE["too many steps"]
         again = many & ~self.stiff[open_] & self.explicit
@@ -187,7 +187,7 @@ class _Course:
         return over
 
     def _judge(self, which: Array, ended: SpanResults, watched: Array) -> None:
-        """Record the outcomes that are certain at the end of a span."""
+        """Record the outcomes of motions `which` that are certain at the end of a span."""
         runs, found, state = self.runs, self.found, self.state
         found[which] = _seen(runs, which, ended)
         running = np.flatnonzero(found[which] == OPEN)
@@ -219,7 +219,7 @@ class _Course:
         self.between[which] = apart
 
     def _goes_on(self, which: Array, tally: Array) -> Array:
-        """True for motions about unstable steady sliding that stay bounded without repeating themselves."""
+        """True (k,) for motions about unstable steady sliding that oscillate irregularly without growing."""
         rest = self.runs.rest.part(which)
         count, peak = (tally[:, TALLY.index(name)] for name in ("velocity_peaks", "peak_velocity"))
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -245,13 +245,13 @@ def _fates(runs: MotionBatch, threads: int | None, start: Array) -> Array:
 
 
 def _alike(now: Array, before: Array) -> Array:
-    """True where slip events are as far apart in time as at the end of the span before."""
+    """True where the time between slip events agrees with that at the end of the span before."""
     with np.errstate(invalid="ignore"):
         return np.asarray((now > 0) & (np.abs(now - before) < ALIKE * now))
 
 
 def _seen(runs: MotionBatch, which: Array, ended: SpanResults) -> Array:
-    """Outcomes that follow from the status of a run; OPEN where it can go on."""
+    """Outcomes that follow from the status of runs at the end of a span; OPEN where they can go on."""
     status = ended.status
     found = np.full(len(status), NO_SOLUTION)
     found[status == CODE["done"]] = OPEN
@@ -259,7 +259,7 @@ def _seen(runs: MotionBatch, which: Array, ended: SpanResults) -> Array:
     found[status == CODE["contact lost"]] = CONTACT_LOST
     many = status == CODE["too many steps"]
     limited = np.flatnonzero((status == CODE["stuck"]) | many)
-    if len(limited):  # the integrator's limits, or no solution
+    if len(limited):  # either the integrator's limits, or no continuous solution
         folded = at_fold(runs.rest.part(which[limited]), ended.state[limited], ended.unknowns[limited])
         lost = ~np.all(np.isfinite(ended.state[limited]), axis=1)
         further = np.where(many[limited], np.where(lost, EXHAUSTED, OPEN), STUCK)

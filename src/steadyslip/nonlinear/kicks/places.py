@@ -1,4 +1,4 @@
-"""Place and unit of a kick: what size one means at a body, contact or drive."""
+"""Body or contact of a kick, and its units: the amount of a kick of size 1 at a body, contact or drive."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from steadyslip.nonlinear.kicks.rest import Rest
 
 
 def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Problem]:
-    """Problems with the place of a kick, as a list for error messages."""
+    """Problems with the body or contact `at` of a kick, as a list for error messages."""
     known = list(rig.contacts) if kick == "normal-force" else list(rig.ends())
     what = "contact" if kick == "normal-force" else "body"
     if at is None:
@@ -49,7 +49,7 @@ def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Pro
 
 
 def refuse_jump(rig: Slider | Machine) -> None:
-    """Raise NotAvailable if a step of the load point is an infinite force, through a dashpot, or moves nothing."""
+    """Raise NotAvailable if a step of the load point would need an infinite force (dashpot), or moves nothing."""
     if isinstance(rig, Machine) and not any(LOAD_POINT in e.senses for e in rig.mechanism().elements):
         raise NotAvailable(
             "a displacement step of the drive moves nothing where no link is between the drive and a body, only the "
@@ -64,7 +64,7 @@ def refuse_jump(rig: Slider | Machine) -> None:
 
 
 def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, Array]:
-    """SI unit of a kick, its amount at size one, and the velocity change of a blow of size one."""
+    """SI unit of a kick, its amount at size 1, and for a blow the change of velocity at size 1 (else 0)."""
     model, point, none = jobs.point.model, jobs.point, np.zeros(1)
     if not rest.is_machine:
         drive = np.abs(np.asarray(point.drive, dtype=float))
@@ -87,7 +87,7 @@ def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, 
         speed = np.abs(np.asarray(slip_rates(point)[0], dtype=float))
         if kick == "force":
             return "N", _largest_force(point, model), none
-        return ("m/s", speed, speed) if kick == "velocity" else ("N s", _felt_mass(point, model, at) * speed, speed)
+        return ("m/s", speed, speed) if kick == "velocity" else ("N s", _point_mass(point, model, at) * speed, speed)
     body = next(one for one in model.coordinates if one.name == at)
     scales, _ = natural_scales(point, jobs.reduction)
     turns = body.unit == "rad"
@@ -117,10 +117,10 @@ def _largest_force(point: OperatingPoint, model: Model) -> Array:
 
 
 def _force(point: OperatingPoint, model: Model, at: str) -> Array:
-    """Largest steady normal force (N) as felt at a body, through the lever at which contacts rub."""
+    """Largest steady normal force (N, for rotations N m) at a body, each contact's force times its lever."""
     numbers = [np.asarray(one, dtype=float) for one in point.evaluate(_levers(model, at))]
-    felt = [np.abs(lever) * force for lever, force in zip(numbers, _normal_forces(point, model), strict=True)]
-    largest: Array = np.maximum.reduce(np.broadcast_arrays(*felt))
+    forces = [np.abs(lever) * force for lever, force in zip(numbers, _normal_forces(point, model), strict=True)]
+    largest: Array = np.maximum.reduce(np.broadcast_arrays(*forces))
     return np.asarray(np.where(largest > 0, largest, _largest_force(point, model)))
 
 
@@ -130,9 +130,9 @@ def steady_speeds(point: OperatingPoint, at: str) -> Any:
 
 
 def struck(point: OperatingPoint, at: str, change: Any) -> dict[str, Any]:
-    """Velocities after a blow (m/s, rad/s) by the names of variables, with the change of velocity at its place.
+    """Velocities after a blow (m/s, rad/s) by names of variables; `change` is that of the velocity at `at`.
 
-    At a point of a structure the blow is a force there, so that all of the structure's coordinates get their share.
+    A blow at a point of a structure changes all of the structure's coordinates.
     """
     model = point.model
     moved = _share_of_blow(model, at) if at in model.points else {at: 1.0}
@@ -145,9 +145,9 @@ def struck(point: OperatingPoint, at: str, change: Any) -> dict[str, Any]:
 
 
 def largest_blow(jobs: Jobs, at: str, change: Array) -> float:
-    """Size of a blow at which the first contact stops whose law knows forward slip alone, for `change` at size one.
+    """Size of a blow that stops a contact whose law is for forward slip only; `change`: velocity change at size 1.
 
-    Infinite where the blow stops no such contact: it may hurry contacts, or their laws know slip both ways.
+    Infinite where it stops no contact with such a law: it accelerates contacts, or their laws allow slip both ways.
     """
     model, point, found = jobs.point.model, jobs.point, math.inf
     if not at:  # a slider's block
@@ -166,14 +166,14 @@ def largest_blow(jobs: Jobs, at: str, change: Array) -> float:
 
 
 def _share_of_blow(model: Model, at: str) -> dict[str, float]:
-    """Change of velocity of each coordinate for a blow that changes that of a point by one; inertias are equal."""
+    """Change of velocity of each coordinate for a blow that changes that of point `at` by 1; inertias are equal."""
     row = {name: float(share) for name, share in model.points[at].items()}
     size = sum(share**2 for share in row.values())
     return {name: share / size for name, share in row.items()}
 
 
-def _felt_mass(point: OperatingPoint, model: Model, at: str) -> Array:
-    """Mass (kg) that a blow at a point of a structure meets."""
+def _point_mass(point: OperatingPoint, model: Model, at: str) -> Array:
+    """Effective mass (kg) of a point of a structure: impulse of a blow over the change of the point's velocity."""
     size = sum(float(share) ** 2 for share in model.points[at].values())
     inertia = point.evaluate(_inertias(model))[_place(model, next(iter(model.points[at])))]
     return np.asarray(inertia, dtype=float) / size
@@ -190,7 +190,7 @@ def _inertias(model: Model) -> ArrayFunction:
 
 @cached
 def _levers(model: Model, at: str) -> ArrayFunction:
-    """Slip rate of each contact per velocity of a body: moving alone, or else with all bodies as in sliding."""
+    """Compiled function: slip rate of each contact per velocity of a body that moves alone (or, if that is 0, all)."""
     body = model.coordinates[_place(model, at)]
     found = []
     for contact in model.contacts:

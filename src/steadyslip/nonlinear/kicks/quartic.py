@@ -1,11 +1,12 @@
 """Cubic and quartic terms of a Lyapunov function of stable steady sliding, from the Taylor series of the rates.
 
-In complex modes z' = Λ z + N2(z) + N3(z) + ..., V2 = |q|² falls as far as Λ goes. What N2 and N3 add to its slope V3
-and V4 take up: along the linear motion a monomial z^m changes at the rate m·λ, by which what it is to cancel is divided
-(the homological equation of Poincaré's normal form). Where m·λ is small, as of (z z̄)² of a mode that rings, it stays.
+In complex modes z' = Λ z + N2(z) + N3(z) + ..., V2 = |q|² falls by the linear terms. V3 and V4 cancel the terms that N2
+and N3 add to its time derivative: along the linear motion a monomial z^m changes at the rate m·λ, so that the term
+to cancel is divided by m·λ (homological equation of Poincaré's normal form). Where m·λ is small, as for (z z̄)² of a
+little damped mode, the term is left.
 
-Derivatives of the rates are differences of their Jacobian, and the terms have no error bounds: whether V falls is asked
-of the full rates.
+Derivatives of the rates are finite differences of their Jacobian, and the coefficients have no error bounds: the
+decrease of V is therefore checked with the full rates.
 """
 
 from __future__ import annotations
@@ -21,26 +22,26 @@ from steadyslip.core.arrays import Array
 from steadyslip.nonlinear.kicks.field import slopes_at, solved_at
 from steadyslip.nonlinear.kicks.rest import Rest
 
-STEP = 6e-3  # of differences, in natural sizes: the formulas' error, its fourth power, is near that of rounding
-PLACES = np.array([-2.0, -1.0, 1.0, 2.0])  # in steps, and the weights of the first and second derivative
+STEP = 6e-3  # step of differences, natural sizes: its fourth power, the truncation error, is near that of rounding
+PLACES = np.array([-2.0, -1.0, 1.0, 2.0])  # points of differences, in steps; weights for both derivatives follow
 FIRST = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 SECOND = np.array([-1.0, 16.0, 16.0, -1.0]) / 12.0
-REACH = 8.0  # distance |q| beyond which V is not asked for
-BISECTIONS = 24  # of that range
-RESONANT = 0.1  # |m·λ|, as a share of the sum of the |λ|, below which a term is left
+REACH = 8.0  # largest distance |q| at which V is evaluated
+BISECTIONS = 24  # number of bisections of that distance
+RESONANT = 0.1  # |m·λ| over the sum of |λ|, below which a term is left
 
 
 def terms(rest: Rest, basis: Array, inverse: Array) -> tuple[Array, Array]:
     """Symmetric coefficients of V3 (m, n, n, n) and V4 (m, n, n, n, n) in coordinates q, where V2 = |q|².
 
-    `basis` and `inverse` (m, n, n) are the real modes, as of `neighbourhood.modes`.
+    `basis` and `inverse` (m, n, n) are the real modes, as from `neighbourhood.modes`.
     """
     roots, vectors = np.linalg.eig(inverse @ rest.matrix @ basis)
     back = np.linalg.inv(vectors)
     second, third = _curved(rest, basis)
     second = _times(back @ inverse, _in(second, vectors, 2)) / 2
     third = _times(back @ inverse, _in(third, vectors, 3)) / 6
-    metric = np.swapaxes(vectors, 1, 2) @ vectors  # of q·q in z
+    metric = np.swapaxes(vectors, 1, 2) @ vectors  # |q|² as quadratic form in z
     v3 = _cancelling(2 * _times(metric, second), roots)
     slope = 2 * _times(metric, third) + 3 * np.einsum("mija,makl->mijkl", v3, second)
     v4 = _cancelling(slope, roots)
@@ -49,9 +50,9 @@ def terms(rest: Rest, basis: Array, inverse: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """V = ρ² + a3 ρ³ + a4 ρ⁴ and its gradient along rays ρ d from steady sliding, arrays (m, d) and (m, d, n).
+    """V = ρ² + a3 ρ³ + a4 ρ⁴ (m, d) and its gradient (m, d, n) on d rays from steady sliding of each of m rigs.
 
-    V is trusted up to its first maximum on a ray.
+    V is used up to its first maximum on a ray.
     """
 
     way: Array
@@ -60,7 +61,7 @@ class Rays:
 
     @classmethod
     def along(cls, way: Array, v3: Array, v4: Array) -> Rays:
-        """Rays along unit vectors (m, d, n), from the forms of `terms`."""
+        """Rays along unit vectors `way` (m, d, n), with the coefficients returned by `terms`."""
         count, rays, n = way.shape
         twice = (way[..., :, None] * way[..., None, :]).reshape(count, rays, -1)
         thrice = (twice[..., :, None] * way[..., None, :]).reshape(count, rays, -1)
@@ -73,33 +74,33 @@ class Rays:
 
     @cached_property
     def cubic(self) -> Array:
-        """a3."""
+        """Coefficient a3 (m, d)."""
         return np.asarray(np.sum(self.gradient3 * self.way, axis=2) / 3)
 
     @cached_property
     def quartic(self) -> Array:
-        """a4."""
+        """Coefficient a4 (m, d)."""
         return np.asarray(np.sum(self.gradient4 * self.way, axis=2) / 4)
 
     @cached_property
     def farthest(self) -> Array:
-        """ρ of the first maximum; inf without one."""
+        """Distance ρ (m, d) of the first maximum of V; inf without one."""
         with np.errstate(all="ignore"):
             under = 9 * self.cubic**2 - 32 * self.quartic
             below = -3 * self.cubic + np.sqrt(under)
             return np.where((under >= 0) & (below > 0), 4 / below, np.inf)
 
     def value(self, rho: Array) -> Array:
-        """V at distances (m, d)."""
+        """V (m, d) at distances ρ (m, d)."""
         return np.asarray(rho**2 * (1 + rho * (self.cubic + rho * self.quartic)))
 
     def gradient(self, rho: Array) -> Array:
-        """Gradient of V at distances (m, d)."""
+        """Gradient of V (m, d, n) at distances ρ (m, d)."""
         rho = rho[..., None]
         return np.asarray(rho * (2 * self.way + rho * (self.gradient3 + rho * self.gradient4)))
 
     def distance(self, level: Array) -> Array:
-        """ρ at which V reaches levels (m,); NaN where it does not within `REACH`."""
+        """Distance ρ (m, d) at which V reaches levels (m,); NaN where it does not within `REACH`."""
         level = level[:, None]
         low, high = np.zeros(self.cubic.shape), np.minimum(self.farthest, REACH)
         met = self.value(high) >= level
@@ -111,7 +112,7 @@ class Rays:
 
 
 def _cancelling(slope: Array, roots: Array) -> Array:
-    """Form (m, n, ..., n) whose slope along the linear motion cancels another, but for resonant terms."""
+    """Form (m, n, ..., n) whose time derivative in linear motion is −`slope`, but for resonant terms."""
     order, even = slope.ndim - 1, np.zeros_like(slope)
     rates, sizes = np.zeros_like(slope), np.zeros(slope.shape)
     for k in range(order):
@@ -124,7 +125,7 @@ def _cancelling(slope: Array, roots: Array) -> Array:
 
 
 def _curved(rest: Rest, basis: Array) -> tuple[Array, Array]:
-    """Second and third derivatives of the rates in natural sizes, (m, n, n, n) and (m, n, n, n, n), along `basis`."""
+    """Second and third derivatives of the rates along `basis`, natural sizes, (m, n, n, n) and (m, n, n, n, n)."""
     count, n = rest.state.shape
     pairs = list(combinations(range(n), 2))
     sizes = np.max(np.abs(basis), axis=1)  # (m, n)
@@ -160,7 +161,7 @@ def _times(matrix: Array, form: Array) -> Array:
 
 
 def _in(form: Array, matrix: Array, count: int) -> Array:
-    """Forms with their last `count` indices, in which they are symmetric, in other coordinates: old = `matrix` new."""
+    """Forms with their last `count` indices transformed to new coordinates, where old = `matrix` new."""
     for _ in range(count):
         form = np.moveaxis(
             _times(np.swapaxes(matrix, 1, 2), np.moveaxis(form, -1, 1)), 1, form.ndim - count

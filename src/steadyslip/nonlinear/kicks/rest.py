@@ -1,4 +1,4 @@
-"""Steady sliding under constant inputs, which is the state a kicked rig may return to."""
+"""Steady sliding under constant inputs: the state to which a kicked rig may return."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import natural_scales
 
-NEUTRAL = 1e-8  # growth per radian below which small motions count as neither growing nor decaying
+NEUTRAL = 1e-8  # growth or decay per radian below which small motions count as neutral
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,17 +28,17 @@ class Rest:
     point : OperatingPoint
         The rigs; numbers or (m,).
     velocity, force, pressure : ndarray (m,)
-        Of the load point, m/s; force on a body, N, and added normal stress, Pa, of machines N.
+        Velocity of the load point, m/s; force on a body, N; added normal stress, Pa, for machines N.
     state : ndarray (m, n)
-        NaN where there is none.
+        Steady state; NaN where there is none.
     unknowns : ndarray (m, u)
-        What the balances leave to Newton's method there, in the order of `Reduction.unknowns`.
+        Solutions of the force balances in steady sliding, in the order of `Reduction.unknowns`.
     scales : ndarray (m, n)
         Natural sizes of the state variables.
     matrix : ndarray (m, n, n)
-        Jacobian of the rates there, in natural sizes, 1/s.
+        Jacobian of the rates in steady sliding, in natural sizes, 1/s.
     roots : ndarray (m, n)
-        Its eigenvalues, 1/s.
+        Eigenvalues of `matrix`, 1/s.
     """
 
     reduction: Reduction
@@ -54,18 +54,18 @@ class Rest:
 
     @property
     def sigmas(self) -> tuple[Array, ...]:
-        """The rigs' own steady normal stresses, which the equations refer to, (m,) for each contact."""
+        """Steady normal stresses (m,) of each contact at the rigs' own inputs, to which the equations refer, Pa."""
         own = (np.asarray(sigma, dtype=float) for sigma in self.point.sigmas)
         return tuple(np.broadcast_to(sigma, self.velocity.shape) for sigma in own)
 
-    def given(self) -> tuple[Any, ...]:
-        """Arguments that functions of `field_of` take before the state."""
+    def arguments(self) -> tuple[Any, ...]:
+        """Arguments of compiled functions, as of `field.field_of`, that precede the state."""
         own = (np.broadcast_to(np.asarray(one, dtype=float), self.velocity.shape) for one in self.point.steady)
         return (*self.point.arguments, *own, self.velocity, self.force, self.pressure)
 
     @property
     def is_machine(self) -> bool:
-        """True if bodies and contacts have names."""
+        """True for a machine, whose bodies and contacts have names."""
         return bool(self.reduction.model.contacts[0].name)
 
     @property
@@ -86,14 +86,14 @@ class Rest:
 
     @property
     def natural_slip(self) -> Array:
-        """Natural length of a step of the load point, (m,); inf where it moves no body by a spring, as beneath one."""
+        """Natural length (m,) of a step of the load point, m; inf where no spring connects it to a body."""
         shifts = np.abs(in_columns(self.point.evaluate(_shifts(self.reduction)), len(self.velocity)))
         with np.errstate(divide="ignore"):
             return np.asarray(np.min(self.scales[:, list(self.places)] / shifts, axis=1))
 
     @property
     def time(self) -> Array:
-        """Natural time, s, (m,): in which the load point moves its natural length, or a body its own."""
+        """Natural time (m,), s: in which the load point moves by its natural length, or else a body by its own."""
         by_load = self.natural_slip / np.abs(self.velocity)
         if np.all(np.isfinite(by_load)):
             return np.asarray(by_load)
@@ -102,7 +102,7 @@ class Rest:
 
     @property
     def contact(self) -> int:
-        """Index of the contact that moves most in the leading mode of the first rig; its slip marks the turns."""
+        """Index of the contact that moves most in the leading mode of the first rig; its slip defines events."""
         slidings = self.reduction.slidings
         if len(slidings) == 1 or not np.all(np.isfinite(self.matrix[0])):
             return 0
@@ -149,12 +149,12 @@ class Rest:
         return Rest(self.reduction, self.point.part(which), *own)
 
     def column(self, number: Any) -> Any:
-        """Value of one parameter, shaped to broadcast against (m, ...) arrays with one more axis."""
+        """A number or array (m,) of a parameter, as (m, 1) if it is an array, to broadcast against (m, d) arrays."""
         return number[:, None] if np.ndim(number) and len(number) != 1 else number
 
 
 def picked(array: Any, which: Array) -> Any:
-    """Entries `which` of an array with one entry for each rig; a single entry is shared by all."""
+    """Entries `which` of an array with one entry for each rig; the array itself if it has one entry for all."""
     return array[which] if np.ndim(array) and len(array) > 1 else array
 
 
@@ -174,7 +174,7 @@ def _slip_gradients(reduction: Reduction) -> ArrayFunction:
 
 
 def in_columns(numbers: Any, count: int) -> Array:
-    """Numbers or arrays (count,) as the columns of one array."""
+    """Array (count, columns) whose columns are numbers or arrays (count,)."""
     if not len(numbers):
         return np.empty((count, 0))
     return np.column_stack([np.broadcast_to(np.asarray(x, dtype=float), (count,)) for x in numbers])

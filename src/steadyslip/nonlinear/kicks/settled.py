@@ -1,8 +1,8 @@
 """Solve for steady sliding under constant inputs, and linearise the motion there.
 
-A step of the load-point velocity or of the normal stress leads to another steady sliding than the rig's own: other
-stress, memory and spring length. Of a slider it is a formula, but for the normal stress perhaps; of a machine it is
-found by Newton's method on the rates. All is in the variables that the kernels integrate.
+A step of the load-point velocity or of the normal stress changes steady sliding: stress, memory and spring length. For
+a slider the new one is in closed form, except in some cases the normal stress; for a machine it is solved for by
+Newton's method on the rates. States are in the variables that the kernels integrate.
 """
 
 from __future__ import annotations
@@ -25,16 +25,19 @@ from steadyslip.nonlinear.kicks.field import normal_stresses, slopes_at, solved_
 from steadyslip.nonlinear.kicks.rest import Rest, in_columns
 
 S = inner_symbol("s", positive=True)
-"""The normal stress sought, apart from the rig's own steady one."""
-STEPS = 8  # from the rig's own inputs to the new ones, where the normal stress has no closed form
-ROUNDS = 40  # largest number of Newton iterations
-SETTLED = 1e-9  # change of the state, in natural sizes, at the end of the search for steady sliding of a machine,
-ROUNDED = 1e-5  # or less than this, where rounding keeps it from falling any further
+"""Normal stress in steady sliding at the new inputs, the unknown; the rig's own is σss."""
+STEPS = 8  # number of steps from the rig's own inputs to the new ones, where there is no closed form
+ROUNDS = 40  # limit of Newton iterations
+SETTLED = 1e-9  # size of the Newton step at convergence, in natural sizes
+ROUNDED = 1e-5  # as SETTLED, if rounding keeps the step from shrinking further
 
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """Functions for steady sliding at other inputs, of parameters, own σss, v_lp, p and the normal stress s."""
+    """Compiled functions of parameters, own σss, v_lp, p and normal stress s, for steady sliding at other inputs.
+
+    `stress` returns the residual of the equation for s and its derivative, `state` the state; `affine`: linear in s.
+    """
 
     affine: bool
     stress: ArrayFunction
@@ -60,7 +63,7 @@ def _balance(reduction: Reduction) -> _Balance:
     past = {symbol: e for one in model.late_signals for symbol, e in one.settled.items()}
 
     def solved(stress: sp.Symbol, unknown: sp.Symbol, target: sp.Expr) -> sp.Expr:
-        """What the definition of a stress, linear in `unknown`, needs to be `target`."""
+        """Value of `unknown` at which a stress, defined linearly in it, equals `target`."""
         definition = model.definitions[stress].xreplace(past)
         definition = definition.xreplace({s: e for s, e in place.items() if s is not unknown})
         return (target - definition.xreplace({unknown: zero})) / sp.diff(definition, unknown)
@@ -83,7 +86,7 @@ def _balance(reduction: Reduction) -> _Balance:
 def rest_of(jobs: Jobs, velocity: Array, pressure: Array, force: Array | None = None) -> Rest:
     """Steady sliding of the rigs of `jobs` at load-point velocities, added normal stresses and forces (m,).
 
-    Where there are several it is the one that the rig's own leads to as the inputs change.
+    Where there are several, it is the one that continues the rig's own as the inputs change.
     """
     force = np.zeros(len(velocity)) if force is None else force
     if jobs.point.model.contacts[0].name:
@@ -107,7 +110,7 @@ def _linearised(
     reduction: Reduction, point: OperatingPoint, velocity: Array, force: Array, pressure: Array, state: Array,
     unknowns: Array, scales: Array,
 ) -> Rest:  # fmt: skip
-    """Build the `Rest` of a known state, with the matrix of the linearised motion."""
+    """The `Rest` of a known state, with the matrix of the linearised motion."""
     count, n = state.shape
     with np.errstate(all="ignore"):
         matrix = slopes_at(reduction, point, (velocity, force, pressure), state, unknowns, scales)
@@ -119,7 +122,7 @@ def _linearised(
 
 
 def _stress(reduction: Reduction, point: OperatingPoint, velocity: Array, pressure: Array) -> Array:
-    """Normal stress in steady sliding at the inputs: in closed form, or by stepping there from the rig's own."""
+    """Normal stress (m,) in steady sliding at the inputs: in closed form, or in steps from the rig's own inputs."""
     balance, sigma = _balance(reduction), np.broadcast_to(point.stresses, velocity.shape)
     if balance.affine:
         at_zero, slope = point.evaluate(balance.stress, velocity, pressure, np.zeros(len(sigma)))
@@ -138,7 +141,7 @@ def _stress(reduction: Reduction, point: OperatingPoint, velocity: Array, pressu
     return np.where(lost, np.nan, stress)
 
 
-# --- of machines: numerically, from where the rig itself slides ---------------------------------------------
+# --- machines: numerically, from the rig's own steady sliding ---------------------------------------------
 
 
 def _machine_rest(jobs: Jobs, velocity: Array, force: Array, pressure: Array) -> Rest:
@@ -167,7 +170,7 @@ def _machine_rest(jobs: Jobs, velocity: Array, force: Array, pressure: Array) ->
 
 
 def _as_fast(reduction: Reduction, point: OperatingPoint, faster: Array) -> list[Any]:
-    """State and unknowns in steady sliding `faster` times as fast; displacements and integrals stay."""
+    """State and unknowns in steady sliding at `faster` times the velocity; displacements and integrals are zero."""
     return point.evaluate(_steady_state_of(reduction), faster)
 
 
@@ -176,7 +179,7 @@ FASTER = inner_symbol("faster", positive=True)
 
 @cached
 def _steady_state_of(reduction: Reduction) -> ArrayFunction:
-    """Function of the steady state, from parameters, normal stresses and the factor of velocity (cached)."""
+    """Compiled function of parameters, normal stresses and factor of velocity: the steady state (cached)."""
     model = reduction.model
     drive = model.parameters["drive.velocity"]
 
@@ -190,7 +193,7 @@ def _steady_state_of(reduction: Reduction) -> ArrayFunction:
     speeds = {contact.velocity: moved(model.steady[contact.velocity]) for contact in model.contacts}
     steady |= {contact.friction: moved(model.steady[contact.friction]) for contact in model.contacts}
     for sliding in reduction.slidings:
-        if sliding.variable is not None:  # whose scale is the rig's own velocity, whatever the load point's is
+        if sliding.variable is not None:  # scaled by the rig's own velocity, whatever the load point's is
             steady[sliding.variable.w] = sliding.variable.w_of_v.xreplace(steady | speeds)
     return model.function((steady[symbol] for symbol in (*reduction.state, *reduction.unknowns)), FASTER)
 
@@ -198,7 +201,7 @@ def _steady_state_of(reduction: Reduction) -> ArrayFunction:
 def _settled(
     reduction: Reduction, point: OperatingPoint, inputs: tuple[Array, ...], guess: Array, scales: Array
 ) -> tuple[Array, Array]:
-    """Solve for a state (m, n) and unknowns (m, u) of rest, near a guess of both; NaN where there is none."""
+    """Steady state (m, n) and unknowns (m, u), by Newton's method from a guess of both; NaN where there is none."""
     count, n = scales.shape
     state, unknowns = guess[:, :n].copy(), guess[:, n:].copy()
     nothing = np.full((count, n, n), np.nan)

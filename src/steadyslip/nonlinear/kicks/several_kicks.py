@@ -20,7 +20,7 @@ from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
 
 @dataclass(frozen=True)
 class Thresholds(Displayed):
-    """Thresholds of several kinds of kick of one rig."""
+    """Thresholds of several kinds of kick of one rig; `interrupted` is True if Ctrl-C ended the search."""
 
     rig: Slider | Machine
     found: tuple[Threshold, ...]
@@ -30,12 +30,12 @@ class Thresholds(Displayed):
         return "\n".join(map(str, self.found))
 
     def to_dict(self) -> list[dict[str, Any]]:
-        """One entry for each kind of kick."""
+        """JSON-ready list with one dict for each kind of kick, SI units."""
         return [one.to_dict() for one in self.found]
 
     @cached_property
     def basin(self) -> Basin:
-        """The basin of the same rig, computed once; of a machine in the plane of the body that is kicked."""
+        """Basin of the rig (cached); for a machine in the plane of the body that is kicked."""
         at = next((one.at for one in self.found if one.at), None)
         if at is not None and at in self.rig.contacts:
             at = self.rig.contacts[at].held
@@ -48,18 +48,18 @@ def thresholds_shown(rig: Slider | Machine, kicks: Sequence[str], **options: Any
     if problems:
         raise ParameterError(problems)
     found: list[Threshold] = []
-    with progress_text("starting") as said:
+    with progress_text("starting") as show:
         for kick in kicks:
             which = f"{kick} kicks ({len(found) + 1} of {len(kicks)})"
 
-            def told(tried: int, low: float, high: float, which: str = which) -> None:
+            def report(tried: int, low: float, high: float, which: str = which) -> None:
                 bracket = f"survived up to size {low:.6g}" + (f", not at {high:.6g}" if math.isfinite(high) else "")
-                said(f"{which}: {tried} run, {bracket}; Ctrl-C keeps what there is")
+                show(f"{which}: {tried} run, {bracket}; Ctrl-C keeps what there is")
 
-            told(0, 0.0, math.inf)
+            report(0, 0.0, math.inf)
             try:
-                found.append(threshold(rig, kick, **options, progress=told))
-            except KeyboardInterrupt:  # before this kick had an answer; those before it keep theirs
+                found.append(threshold(rig, kick, **options, progress=report))
+            except KeyboardInterrupt:  # before the search of this kick began; earlier results are kept
                 if not found:
                     raise
                 return Thresholds(rig, tuple(found), True)

@@ -1,15 +1,15 @@
-"""Decide outcomes close to an edge of stability from the drift of single turns, without simulating thousands.
+"""Decide outcomes close to an edge of stability from the drift in single turns, without simulating thousands.
 
-There, the distance |q| (see `neighbourhood`) changes by parts in thousands or millions a turn, and swings by more
-within it.
+Close to an edge the distance |q| from steady sliding (see `neighbourhood`) changes by parts in thousands or millions a
+turn, and oscillates by more within one.
 
-Where all modes but the slowest pair die out within a turn, motion takes place on a surface. It is followed from points
-on a ray out of steady sliding until it comes back to the ray (once before, to get onto the surface). Up to the first
-point that does not come back nearer, every motion returns: orbits on a surface do not cross. Points that come back
-farther form a band through which everything in it is carried outwards; if motion from one turn's worth of points at its
-outer end comes to the same, so does all that is in the band.
+If all modes but the slowest pair decay within a turn, motion takes place on a surface. Motions are simulated from
+points on a ray out of steady sliding until they cross the ray again (after a first turn that brings them onto the
+surface). Orbits on a surface do not cross: up to the first point that does not come back nearer, every motion returns.
+Points that come back farther form a band through which motion is carried outwards; if motions from one turn's worth of
+points at its outer end have one outcome, it is that of all motions in the band.
 
-Elsewhere nothing is said; the `neighbourhood` reaches far there.
+Other motions are left undecided; for most of these rigs the `neighbourhood` is large.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from steadyslip.nonlinear.kicks.neighbourhood import LARGEST
 from steadyslip.nonlinear.kicks.spans import CERTAIN, OPEN, RETURNS, MotionBatch, advanced_runs
 
 DONE = STATUSES.index("done")
-COUNT = 32  # shells, from the ball of `neighbourhood` to a few natural sizes,
-FINE = 24  # shells between the last that falls and the first that rises,
-REFINED = 2  # rounds of that refinement
-NOISE = 25.0  # drift of a turn, in tolerances per step, above which it exceeds the errors of integration
+COUNT = 32  # number of shells, from the ball of `neighbourhood` to a few natural sizes
+FINE = 24  # number of shells between the last that falls and the first that rises, in each refinement
+REFINED = 2  # number of refinements
+NOISE = 25.0  # drift in a turn, in tolerances per step, above which it exceeds the errors of integration
 SHARE = 0.02  # smallest significant drift, as a share of the linear decay per turn
-POINTS = 16  # starting points on the outer rim of a band for the outcome beyond it
-ROUNDS = 12  # Newton iterations for the time of a turn
+POINTS = 16  # number of starting points on the outer rim of a band for the outcome beyond it
+ROUNDS = 12  # limit of Newton iterations for the time of a turn
 FLAT = 2.0  # decay per radian of the other modes above which motion takes place on a surface
-SLOW = 0.02  # decay per radian of the leading mode above which simulating is as quick
+SLOW = 0.02  # decay per radian of the leading mode above which simulation is as fast
 
 
 class Shells:
@@ -41,10 +41,10 @@ class Shells:
 
     Parameters
     ----------
-    runs : Runs
+    runs : MotionBatch
     threads : int, optional
     fates : callable
-        Says what comes of runs from given states: ``fates(runs, threads, states)``, as `outcomes.outcomes_of`.
+        Returns the outcomes of runs from given states: ``fates(runs, threads, states)``, as `outcomes.outcomes_of`.
     """
 
     def __init__(
@@ -57,27 +57,28 @@ class Shells:
             others = np.sort(roots.real, axis=1)[:, :-2]
             self.flat = np.all(others < -FLAT * np.abs(runs.rest.leading.imag)[:, None], axis=1)
         self.known = np.zeros(count, dtype=bool)
-        self.inner = np.zeros(count)  # radius of the ball,
-        self.band = np.tile([np.inf, -np.inf], (count, 1))  # and of both rims of the band
+        self.inner = np.zeros(count)  # radius up to which every motion returns
+        self.band = np.tile([np.inf, -np.inf], (count, 1))  # inner and outer radius of the band
         self.fate_known = np.zeros(count, dtype=bool)  # True where `beyond` has been computed
-        self.beyond = np.full(count, OPEN)  # what comes of that
+        self.beyond = np.full(count, OPEN)  # outcome of motions in the band
 
     def outcomes(self, which: Array, states: Array) -> Array:
-        """Outcomes of runs `which` (k,) at `states` (k, n) as far as shells decide them; else OPEN."""
+        """Outcomes (k,) of runs `which` at `states` (k, n) as far as shells decide them; else OPEN."""
         group = self.runs.group[which]
-        self._ask(np.unique(group))
+        self._ensure_computed(np.unique(group))
         useful = (self.inner[group] > 0) | (self.band[group, 0] < self.band[group, 1])
         away = np.full(len(which), np.inf)
         if useful.any():
             away[useful] = self._on_ray(which[useful], states[useful])
         found = np.where(away < self.inner[group], RETURNS, OPEN)
         inside = (away > self.band[group, 0]) & (away < self.band[group, 1])
-        for one in np.unique(group[inside & ~self.fate_known[group]]):  # costly: only where a motion is
+        for one in np.unique(group[inside & ~self.fate_known[group]]):  # costly: only for bands with a motion in them
             fate = self._fate(one, self.band[one, 1])
             self.fate_known[one], self.beyond[one] = True, fate if fate in CERTAIN else OPEN
         return np.where(inside, self.beyond[group], found)
 
-    def _ask(self, group: Array) -> None:
+    def _ensure_computed(self, group: Array) -> None:
+        """Compute the shells of some rigs, unless known, or simulation is as fast, or motion is not on a surface."""
         rest, near = self.runs.rest, self.runs.near
         group = group[~self.known[group]]
         self.known[group] = True
@@ -90,7 +91,7 @@ class Shells:
             self._compute(group)
 
     def _compute(self, group: Array) -> None:
-        """Ball and band of some of the rigs."""
+        """Compute inner radius and band of some of the rigs."""
         near, leading = self.runs.near, self.runs.rest.leading[group]
         with np.errstate(divide="ignore"):
             blurred = NOISE * self.runs.jobs.options.rtol * np.abs(leading.imag / (2 * np.pi * leading.real))
@@ -115,7 +116,7 @@ class Shells:
         self.band[group] = np.column_stack([begin, end])
 
     def _drift(self, group: Array, radii: Array) -> tuple[Array, Array]:
-        """True where distances fall, and where they rise, over a turn from radii (k, r) on the ray."""
+        """True (k, r) where distances fall, and True where they rise, over a turn from radii (k, r) on the ray."""
         rest, near = self.runs.rest, self.runs.near
         n = rest.state.shape[1]
         away = radii[:, :, None] * near.basis[group][:, None, :, 0]
@@ -133,9 +134,9 @@ class Shells:
         return change < -least, change > least
 
     def _to_ray(self, which: Array, states: Array, guess: Array) -> tuple[Array, Array]:
-        """Times at which runs from `states` (k, n) meet the ray, near those guessed (k,), and the states there.
+        """Distances (k,) at which runs from `states` (k, n) cross the ray near times `guess` (k,), s, and the states.
 
-        NaN where they do not; distances count in the slowest two modes.
+        NaN where they do not; distances are those in the slowest two modes.
         """
         rest, near = self.runs.rest, self.runs.near
         time, radius, found = guess.copy(), np.full(len(which), np.nan), np.full_like(states, np.nan)
@@ -162,11 +163,11 @@ class Shells:
         return radius, found
 
     def _on_ray(self, which: Array, states: Array) -> Array:
-        """Distance |q| at which runs from `states` (k, n) next meet the ray."""
+        """Distance |q| (k,) at which runs from `states` (k, n) next cross the ray; inf where they do not."""
         rest, near = self.runs.rest, self.runs.near
         q = near.coordinates(which, states)
         sense = self._sense(which)
-        angle = np.mod(-sense * np.arctan2(q[:, 1], q[:, 0]), 2 * np.pi)  # still to go
+        angle = np.mod(-sense * np.arctan2(q[:, 1], q[:, 0]), 2 * np.pi)  # left to the ray
         found, _ = self._to_ray(which, states, (angle + 2 * np.pi) / np.abs(rest.leading[which].imag))
         return np.where(np.isnan(found), np.inf, found)
 
@@ -191,7 +192,10 @@ class Shells:
 
 
 def _drifts(radii: Array, falls: Array, rises: Array) -> tuple[Array, Array, Array]:
-    """Radius up to which distances fall, and the one from which they rise; inf without one. Arrays (k, r)."""
+    """Radius up to which distances fall, and first and last radius at which they rise (inf if none), (k,) each.
+
+    `radii` (k, r) rise; `falls` and `rises` (k, r) are True where the distance does so over a turn.
+    """
     count, each = radii.shape[1], np.arange(len(radii))
     last = np.argmin(np.column_stack([falls, np.zeros(len(radii), dtype=bool)]), axis=1) - 1
     beyond = rises & (np.arange(count) > last[:, None])

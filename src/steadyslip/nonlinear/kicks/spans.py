@@ -26,26 +26,26 @@ DOUBTS = (
     "the integration could not go on",
     "how near to steady sliding counts as back was not found",
 )
-"""Why a motion is undecided."""
+"""Reasons for which a motion is undecided."""
 OUTCOMES = ("returns", "blow-up", "contact lost", "oscillation", "no solution", "interrupted",
             *len(DOUBTS) * ["undecided"])  # fmt: skip
 RETURNS, BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION, INTERRUPTED, UNDECIDED = range(7)
-"""Numbers of outcomes; from `UNDECIDED` on they are those of `DOUBTS`."""
+"""Indices into `OUTCOMES`; `UNDECIDED` + i is an undecided outcome for the reason `DOUBTS[i]`."""
 LATE, EXHAUSTED, SPENT, STUCK, UNSEEN = range(UNDECIDED, len(OUTCOMES))
 CERTAIN = (BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION)
-"""Outcomes that are not a return."""
-OPEN = -1  # number of no outcome: not known yet
+"""Decided outcomes other than a return."""
+OPEN = -1  # in arrays of outcomes: not decided yet
 
-USUAL = 3  # state variables of a slider, the unit of the work of a step
+USUAL = 3  # number of state variables of a slider, for which budgets of steps are given
 STIFF = "rodas4"  # method for stiff motions, and for those for which the explicit method needs too many steps
-LOADING = 40.0  # smallest advance of the load point, natural lengths, to take up what a kick has released,
-TURNS = 3.0  # natural periods,
-DECAYS = 6.0  # and decay times in the first span of a run; each span is twice as long as the one before
-MOST_TURNS = 1000.0  # natural periods,
-MOST_DECAYS = 20.0  # decay times, and
-MOST_LOADING = 4000.0  # natural lengths after which a motion is undecided
-RELOAD = 1.5  # factor on the time in which the load point catches up with the block, without motion to wait for
-NEUTRAL_TURNS = 100.0  # natural periods of bounded motion that count as a return where sliding is neutrally stable
+LOADING = 40.0  # advance of the load point in the first span, natural lengths; each span is twice as long as the last
+TURNS = 3.0  # added to the first span, natural periods
+DECAYS = 6.0  # added to the first span, decay times
+MOST_TURNS = 1000.0  # longest simulated time, natural periods
+MOST_DECAYS = 20.0  # longest simulated time, decay times, if that is more
+MOST_LOADING = 4000.0  # added to the longest simulated time, natural lengths of advance
+RELOAD = 1.5  # factor on the time in which the load point catches up with the block, during which nothing is decided
+NEUTRAL_TURNS = 100.0  # natural periods of bounded motion that count as a return if sliding is neutrally stable
 
 
 def doubt_of(outcome: int) -> str:
@@ -55,13 +55,13 @@ def doubt_of(outcome: int) -> str:
 
 @dataclass
 class StepBudget:
-    """Integration steps that a search may still take, over all its motions."""
+    """Number of integration steps left to a search, for all its motions."""
 
     steps: float = np.inf
 
     @classmethod
     def of(cls, steps: float, variables: int) -> StepBudget:
-        """Budget of `steps` for a slider; less for more variables, by the cube of their number, as a step costs."""
+        """Budget of `steps` for a slider, reduced for more variables by the cube of their number (cost of a step)."""
         return cls(steps * min(1.0, (USUAL / variables) ** 3))
 
 
@@ -72,19 +72,19 @@ class MotionBatch:
     Attributes
     ----------
     jobs : Jobs
-        Rigs and where they start, one for each motion.
+        Rig and initial state of each motion.
     rest : Rest
-        The steady sliding that their inputs allow.
+        Steady sliding at the inputs of each motion.
     near : Neighbourhood
-        Of that.
+        Neighbourhood of `rest` from which all motion returns to it.
     jump : ndarray (m,)
         Step of the load point at the start, m.
     group : ndarray of int (m,)
-        For each motion the first with the same rig and inputs.
+        For each motion the index of the first one with equal rig and inputs.
     effort : float
-        Multiplies how long a motion is followed before it is undecided.
+        Factor on the longest simulated time.
     budget : StepBudget
-        Motions that are open when it is used up are undecided.
+        Motions without an outcome when it is used up are undecided.
     """
 
     jobs: Jobs
@@ -96,7 +96,7 @@ class MotionBatch:
     budget: StepBudget = field(default_factory=StepBudget)
 
     def repeated(self, one: int, count: int) -> MotionBatch:
-        """Copies of one rig, to be started from any states."""
+        """Batch of `count` motions of the rig of motion `one`, for any initial states."""
         which = np.full(count, one)
         rest, near = self.rest.part(which), self.near.part(which)
         nothing = np.zeros(count)
@@ -104,7 +104,7 @@ class MotionBatch:
         return MotionBatch(jobs, rest, near, nothing, which * 0, self.effort, self.budget)
 
     def times(self) -> tuple[Array, Array]:
-        """Length of the first span, and the time after which a motion is undecided, s."""
+        """Length of the first span and longest simulated time of each motion, s, (m,) each."""
         rest, leading = self.rest, self.rest.leading
         unit = rest.time
         reload = RELOAD * np.abs(self.jump) / np.abs(rest.velocity)
@@ -118,14 +118,14 @@ class MotionBatch:
         return first, reload + loading * unit + turns * np.where(rest.neutral, 1.0, self.effort)
 
     def reload(self, which: Array, states: Array) -> Array:
-        """Time, s, that the load point needs to catch up with blocks far from where they would slide, (k,)."""
+        """Time (k,), s, in which the load point makes up the distance of states (k, n) from steady sliding."""
         slips = list(self.rest.places)
         away = np.abs(states[:, slips] - self.rest.state[which][:, slips]) / self.rest.speeds[which]
         return np.asarray(np.nan_to_num(RELOAD * np.max(away, axis=1)))
 
 
 def constant_inputs(span: Array, velocity: Array, jump: Array, pressure: Array, force: Array) -> Segments:
-    """One segment for each run, with the load point moved at its start; arguments (m,)."""
+    """One segment of constant inputs for each run, with a jump of the load point at its start; arguments (m,)."""
     count = len(span)
     value = np.zeros((count, 1, 3))
     value[:, 0, 0], value[:, 0, 1], value[:, 0, 2] = velocity, force, pressure
@@ -140,9 +140,9 @@ ARRAYS = ("status", "time", "state", "unknowns", "steps", "tally")
 
 @dataclass
 class SpanResults:
-    """State of some runs at the end of a span: status, time reached (s), state (k, n), steps and tally.
+    """State of k runs at the end of a span: status, time reached (s), state (k, n), steps and tally.
 
-    `unknowns` (k, u) are those of the balances.
+    `unknowns` (k, u) solve the algebraic equations; `whole` is False if Ctrl-C stopped some of the runs.
     """
 
     status: Array
@@ -177,7 +177,7 @@ def advanced_runs(
 ) -> SpanResults:  # fmt: skip
     """Simulate runs `which` (k,) for `span` (k,) s from states `start` (k, n), or from their beginning.
 
-    `unknowns` (k, u) are those of the balances at `start`, NaN where they are not known.
+    `unknowns` (k, u) solve the algebraic equations at `start`, NaN where they are not known.
     """
     jobs, rest = replace(runs.jobs, options=options or runs.jobs.options), runs.rest
     velocity, force, pressure = rest.velocity[which], rest.force[which], rest.pressure[which]
@@ -210,10 +210,10 @@ def advanced_runs(
 def continuous_at(
     reduction: Reduction, point: OperatingPoint, state: Array, inputs: tuple[Array, ...], unknowns: Array | None = None
 ) -> tuple[Array, Array]:
-    """Continuous variables with which a kernel starts, and guesses of its unknowns, as in `Jobs.near`.
+    """Continuous variables (m, n) with which a kernel starts, and guesses of its unknowns, as in `Jobs.near`.
 
     `inputs` are the velocity of the load point, the force on a body and the added normal stress, each (m,);
-    `unknowns` (m, u) those of the balances at the states, NaN where they are not known.
+    `unknowns` (m, u) solve the algebraic equations at the states, NaN where they are not known.
     """
     with np.errstate(all="ignore"):
         found = point.evaluate(restored_of(reduction), *state.T, *inputs, 0.0)

@@ -33,12 +33,12 @@ from steadyslip.nonlinear.kicks.spans import (
 )
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, NormalStressStep, VelocityStep
 
-COARSE = 192  # sizes in the first scan of a single rig
-BLOCK = 48  # sizes simulated at a time
-FINE = 47  # sizes between the ends of a bracket in each round of narrowing
-STEPS = 1e9  # integration steps for all motions of one threshold
-AT_EDGE = 1e-5  # relative width of a bracket that ends at an edge: motions return ever more slowly towards it
-LASTING = ("velocity", "normal-stress", "normal-force", "force")  # steps of what stays; others move a place, or blow
+COARSE = 192  # number of sizes in the first scan
+BLOCK = 48  # number of sizes simulated side by side
+FINE = 47  # number of sizes between the ends of a bracket in each round of narrowing
+STEPS = 1e9  # limit of integration steps for all motions of one threshold
+AT_EDGE = 1e-5  # least relative width of a bracket at an edge of stability, near which motions return very slowly
+LASTING = ("velocity", "normal-stress", "normal-force", "force")  # kicks that change an input for good
 BEYOND = 1.01  # factor on the size of an edge at which the outcome beyond is simulated
 
 
@@ -52,36 +52,36 @@ class Threshold(Displayed):
     kick : str
     direction : int
     size : float
-        Smallest kick that does not return, without unit: ln(new/old velocity), natural lengths, share of the steady
-        normal stress, or change of velocity over the drive's. 0 if steady sliding is unstable, inf if every
-        kick up to `searched` returns, NaN if nothing in it is known to fail and not all is known to return.
+        Smallest kick that does not return, dimensionless: ln(new/old velocity), natural lengths, share of the steady
+        normal stress, or change of velocity over the drive's. 0 if steady sliding is unstable, inf if every kick up to
+        `searched` returns, NaN if some kicks are undecided and none is known to fail.
     bracket : tuple of float
-        Sizes of the largest kick up to which all that were tried return, and of the smallest known not to.
+        Largest size up to which all simulated kicks return, and smallest size known not to return.
     amount : float
-        The size in SI units: velocity after the step (or before it, with ``reference="after"``), displacement,
+        `size` in SI units: velocity after the step (or before it, with ``reference="after"``), displacement,
         change of normal stress, or impulse.
     unit : str
     outcome : str
-        What happens beyond: ``blow-up``, ``oscillation`` (that does not die out), ``contact lost``, ``no solution``,
-        or ``undecided``.
+        Outcome of kicks just beyond: ``blow-up``, ``oscillation`` (that does not die out), ``contact lost``, ``no
+        solution``, or ``undecided``.
     searched : float
-        Largest size tried.
+        Largest size of the search.
     edge : bool
-        Whether the limit is the edge of stability of the steady sliding that the kick leads to: beyond, there is none
-        to return to. `size` is that edge then.
+        True if `size` is the edge of stability of the steady sliding after the kick: beyond it, there is no stable
+        steady sliding to return to.
     decided : bool
-        Whether the bracket is as narrow as was asked for. If not, kicks inside it were followed for the longest time
-        allowed without coming to an end.
+        True if the bracket is as narrow as `precision`. If not, kicks inside it were simulated for the longest time
+        allowed without a certain outcome.
     interrupted : bool
-        Whether Ctrl-C ended the search; the bracket is what was known by then.
+        True if Ctrl-C ended the search; the bracket is that reached by then.
     doubt : str
-        Why kicks inside the bracket, or beyond it, are undecided; empty where none of them is.
+        Reason for which kicks inside the bracket, or beyond it, are undecided; empty if none is.
     survived : float
-        The lower end of the bracket in SI units, as `amount`: all smaller kicks that were tried return.
+        Lower end of the bracket in SI units, as `amount`: all smaller kicks that were simulated return.
     at : str
         Of a machine: the body or contact that is kicked; empty for its drive.
     contact : str
-        Of a machine, where contact is lost beyond: which; in a blow-up the one that is fastest; else empty.
+        Of a machine: the contact that is lost just beyond, or fastest in a blow-up; else empty.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -103,7 +103,7 @@ class Threshold(Displayed):
 
     @property
     def area(self) -> float | None:
-        """Contact area by which a stress amount is multiplied for display as a force; None without one."""
+        """Area (m²) that converts a stress amount to a force for display; None for a rig without area."""
         return self.rig.area
 
     def __str__(self) -> str:
@@ -173,7 +173,7 @@ def threshold(
     branch: int = 0,
     progress: Callable[[int, float, float], None] | None = None,
 ) -> Threshold:
-    """Find the smallest kick of a given kind that does not return to steady sliding.
+    """Smallest kick of one kind after which the motion does not return to steady sliding.
 
     Parameters
     ----------
@@ -188,21 +188,21 @@ def threshold(
     direction : int, optional
         1: faster, forward, pressed harder; -1: the reverse.
     reference : str, optional
-        For ``velocity``: whether the rig's drive is the velocity ``before`` or ``after`` the step. After is right
-        for comparing with results that take normal stress and critical stiffness at the new velocity.
+        For ``velocity``: the rig's drive velocity is that ``before`` or ``after`` the step. Use ``after`` to compare
+        with results that take normal stress and critical stiffness at the new velocity.
     up_to : float, optional
-        Largest size that is searched, without unit like `Threshold.size`. Unless given it is 1e4 times the velocity
-        (of the drive, or of the body that gets the blow), 1e5 natural lengths, or 10 times the normal force or stress.
+        Largest size that is searched, dimensionless like `Threshold.size`. By default 1e4 times the velocity (of the
+        drive, or of the body that gets the blow), 1e5 natural lengths, or 10 times the normal force or stress.
     precision : float, optional
-        Relative width of the bracket; 1e-5 is enough at the edge of stability of what a kick leads to, near which
-        motions return ever more slowly.
+        Relative width of the bracket; never below 1e-5 at an edge of stability of the steady sliding after the kick,
+        near which motions return very slowly.
     rtol : float, optional
-        Error allowed per step of integration; 1e-10, with mass or bristles 1e-8, unless given.
+        Relative error allowed per integration step; by default 1e-10, with mass or bristles 1e-8.
     branch : int, optional
-        Which steady sliding, where there are several.
+        Index of the steady sliding, by rising normal stress, where a rig has several.
     progress : callable, optional
-        Called with the number of kicks decided so far and the ends of the bracket reached. Ctrl-C (or
-        KeyboardInterrupt from here) returns what there is.
+        Called with the number of kicks decided so far and the ends of the bracket reached. Ctrl-C, or a
+        KeyboardInterrupt that it raises, returns the bracket reached.
 
     Returns
     -------
@@ -211,7 +211,7 @@ def threshold(
     Raises
     ------
     NoSteadySliding
-        If there is none to kick.
+        If the rig has no steady sliding.
     NotAvailable
         If the kick is not possible, the motion ill-posed, or numbers leave the range of floating point.
     ParameterError
@@ -219,13 +219,13 @@ def threshold(
 
     Notes
     -----
-    Kicks of rising size are tried side by side, and the bracket of the first that fails is narrowed. What comes of a
-    motion is decided by `steadyslip.nonlinear.kicks.outcomes`: it has returned when it is in a neighbourhood of steady
-    sliding that is never left, it has not when it blows up, loses contact or is on a closed orbit that attracts; it may
-    also be undecided. Where the steady sliding that a kick leads to is not stable nothing returns, and the search ends
-    there. At the edge of stability itself small motions persist; there all that stays bounded counts as returning.
-    All motions together take a billion steps of integration at most, of machines with more variables fewer, about a
-    minute on two cores; what is open then is undecided.
+    Kicks of rising size are simulated side by side, and the bracket of the first that fails is narrowed. The outcome of
+    a motion is decided by `steadyslip.nonlinear.kicks.outcomes`: it returns if it enters a neighbourhood of steady
+    sliding that no motion leaves; it does not if it blows up, loses contact or is on a closed orbit that attracts; else
+    it is undecided. Where the steady sliding after a kick is not stable nothing returns, and the search ends. If it is
+    neutrally stable, small motions persist, and every bounded motion counts as returning. All motions together take at
+    most a billion integration steps, fewer for machines with more variables, about a minute on two cores; motions
+    without an outcome by then are undecided.
 
     Examples
     --------
@@ -235,7 +235,7 @@ def threshold(
     """
     if not 1e-12 <= precision <= 0.1:
         raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
-    steady_states(rig)  # raises, and says why
+    steady_states(rig)  # raises NoSteadySliding with the reason
     kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol, at, up_to)
     if not kicked.exists[0]:
         raise out_of_range_error(kicked.jobs.point)
@@ -252,16 +252,16 @@ def threshold(
 
 
 class _Search:
-    """Search for the bracket of one threshold: a scan of rising sizes, then rounds inside it.
+    """Search for the bracket of one threshold: a scan of rising sizes, then rounds of narrowing.
 
     Attributes
     ----------
     low, high : float
-        Largest size up to which all return, smallest known not to (inf: none).
+        Largest size up to which all kicks return, and smallest known not to (inf if none).
     outcome : int
-        What comes of the latter; why the first doubt is one, where that is all that is known.
+        Index into `OUTCOMES` of the kick `high`; without one, of the smallest undecided kick, or `RETURNS`.
     doubt : int
-        Why kicks inside the bracket are undecided; `RETURNS` where none is.
+        Index into `OUTCOMES` of the smallest undecided kick inside the bracket; `RETURNS` if there is none.
     """
 
     def __init__(self, kicked: Kicked, progress: Callable[[int, float, float], None] | None) -> None:
@@ -272,11 +272,11 @@ class _Search:
         self.tried, self.interrupted = 0, False
 
     def run(self, precision: float) -> None:
-        """Scan, then narrow to a relative precision."""
+        """Scan all sizes, then narrow the bracket to a relative precision."""
         sizes = np.geomspace(self.kicked.kick.low, self.kicked.highest, COARSE)
         self.edge = self.high = float(edges(self.kicked, np.zeros(1, dtype=int), sizes)[0])
         self._scan(sizes[sizes < self.edge])
-        least = precision * self.kicked.kick.low  # smaller kicks, where even they fail, are none
+        least = precision * self.kicked.kick.low  # absolute width that suffices where even the smallest kicks fail
         while np.isfinite(self.high) and self.high - self.low > max(self._enough(precision), least):
             width = self.high - self.low
             self._narrow(self.low + width * np.arange(1, FINE + 1) / (FINE + 1), PATIENCE)
@@ -290,12 +290,12 @@ class _Search:
             self.outcome = LATE if found == RETURNS else found  # neutral sliding at the edge survives nothing
 
     def _enough(self, precision: float) -> float:
-        """Width of the bracket at which it is narrow enough."""
+        """Width of the bracket, dimensionless, at which narrowing ends."""
         return self.high * (max(precision, AT_EDGE) if self.at_edge else precision)
 
     @property
     def at_edge(self) -> bool:
-        """True if the steady sliding after kicks loses its stability before any other limit is met."""
+        """True if the bracket ends where the steady sliding after kicks loses its stability."""
         return bool(np.isfinite(self.high) and self.high == self.edge)
 
     def _scan(self, sizes: Array) -> None:
@@ -329,7 +329,7 @@ class _Search:
             raise KeyboardInterrupt
 
     def _outcomes(self, sizes: Array, effort: float) -> Array:
-        """Simulate kicks of some sizes; outcomes as indices into `OUTCOMES`."""
+        """Outcomes of kicks of some sizes, as indices into `OUTCOMES`; reports progress."""
 
         def advanced(count: int) -> None:
             self.tried += count
@@ -339,7 +339,7 @@ class _Search:
         return self.kicked.outcomes(np.zeros(len(sizes), dtype=int), sizes, None, advanced, effort)
 
     def result(self, rig: Slider | Machine, precision: float) -> Threshold:
-        """Build the `Threshold` from the present bracket."""
+        """The `Threshold` with the present bracket."""
         kicked, low, high = self.kicked, self.low, self.high
         decided = bool(high - low <= self._enough(precision)) if np.isfinite(high) else self.outcome == RETURNS
         size = high if self.at_edge else 0.5 * (low + high)
@@ -360,7 +360,7 @@ class _Search:
 def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
     """Smallest size beyond which no stable steady sliding exists after the kick, (n,); inf if none is found.
 
-    Looked for between rising `sizes`, then bisected to rounding.
+    The first of the rising `sizes` without one is found, then the size is bisected to rounding.
     """
     found = np.full(len(which), np.inf)
     if not kicked.moves_rest:
@@ -393,12 +393,12 @@ class KickMargin(Displayed):
         The protocol piece.
     threshold : Threshold
     ratio : float
-        Threshold over the step's own size, of velocities as logarithms ln(v/v₀); NaN without a threshold.
+        Size of the threshold over that of the step, for velocities sizes ln(v/v₀); NaN without a threshold.
     outcome : str
-        What comes of the step itself: ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution`` or
-        ``undecided``. Beyond the threshold larger kicks may return again.
+        Outcome of the step itself: ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution`` or
+        ``undecided``. Steps beyond the threshold may return too.
     doubt : str
-        Why it is undecided; empty where it is not.
+        Reason for which the outcome is undecided; else empty.
     """
 
     step: Any
@@ -427,13 +427,13 @@ class KickMargin(Displayed):
 
 @checked(precision=finite(0, 0.1), branch=BRANCH)
 def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6, branch: int = 0) -> KickMargin:
-    """Compare an expected disturbance with the smallest kick that is not survived, and simulate it.
+    """Outcome of an expected disturbance, and its distance from the smallest kick that is not survived.
 
     Parameters
     ----------
     rig : Slider or Machine
     step : VelocityStep, DisplacementStep, NormalStressStep, or of a machine DisturbanceStep
-        Its time does not matter.
+        The disturbance; its time is ignored.
     precision, branch
         As for `threshold`.
 

@@ -22,7 +22,7 @@ def test_an_undisturbed_run_says_how_to_disturb_it(late):
     """By a step of the velocity that moves it; steady sliding goes on however unstable it is."""
     a_rig = rig(friction=rate_state(evolution=ss.laws.Aging()), stiffness=9e9)
     run = ss.simulate(a_rig, late, until=10.0)
-    told = re.search(r'were it unstable too; .*disturb it:\n +--protocol "(.*)"\n', run.summary())
+    told = re.search(r'even if it is unstable; .*disturb it:\n +--protocol "(.*)"\n', run.summary())
     piece = ss.piece_from_text(told[1], None, a_rig)
     assert (piece.at, piece.to) == (1.0, pytest.approx(1.1 * a_rig.drive.velocity))
     assert "were it unstable" not in ss.simulate(a_rig, piece, until=10.0).summary()

@@ -1,7 +1,7 @@
 """Motion in time: single runs with their events, and ensembles of runs.
 
-A rig and a protocol become jobs (arrays), kernels integrate them, and the result is a history or an ensemble. Nothing
-here depends on linear stability.
+A rig and a protocol become jobs (arrays), kernels integrate them, and the result is a history or an ensemble. This
+folder does not depend on linear stability (`linear`).
 """
 
 import lazy_loader

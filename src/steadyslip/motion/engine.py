@@ -29,7 +29,7 @@ class Outcome:
     """Result of a kernel for some jobs; `log` and `recorded` are empty except for a single run; `tables` is its input.
 
     ``final``, ``recorded`` and ``samples`` have the columns of `Final`, `Recorded` and `Sampled`; `size` is the length
-    of the state, `balances` the number of unknowns that balances fix.
+    of the state, `balances` the number of unknowns of the algebraic equations (balances of forces).
     """
 
     status: np.ndarray
@@ -54,7 +54,7 @@ class Outcome:
 
     @property
     def unknowns(self) -> np.ndarray:
-        """Final unknowns of the balances, (jobs, unknowns)."""
+        """Final solutions of the algebraic equations, (jobs, unknowns)."""
         own = np.hstack([self.point[:, :1], self.point[:, 1 + self.size :]])
         return np.asarray(own[:, : self.balances])
 
@@ -107,6 +107,7 @@ class Call:
             self.final[0, Final.POINT + point_at(layout, k)] = y[unknown_at(layout, k)]
 
     def outcome(self) -> Outcome:
+        """Results so far; unfinished jobs have the status `INTERRUPTED`."""
         self.status[self.status == 0] = INTERRUPTED
         return Outcome(
             self.status, self.final, self.tally, self.samples,
@@ -119,7 +120,7 @@ def run_single(
     jobs: Jobs, machine: Runner, times: np.ndarray, watch: bool, record: bool,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:  # fmt: skip
-    """Integrate one trajectory, with events and, if asked, its own steps; Ctrl-C ends it with what there is."""
+    """Outcome of one trajectory, with events (`watch`) and solver steps (`record`); Ctrl-C returns its part so far."""
     return run_tables(machine, jobs.tables(machine, 0, 1, watch, record), times, progress)
 
 
@@ -127,9 +128,9 @@ def run_tables(
     machine: Runner, tables: tuple[np.ndarray, ...], times: np.ndarray,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:  # fmt: skip
-    """Integrate one trajectory from the kernel's arrays; the settings contain what to watch and record.
+    """Outcome of one trajectory from the kernel's arrays, whose settings switch events and recording on.
 
-    `progress` is called now and then with the time reached, s.
+    `progress` is called between calls of the kernel with the time reached, s.
     """
     settings = tables[2][0]
     call = Call(machine, tables, 1, times)
@@ -153,7 +154,7 @@ def run_tables(
 def run_chunk(
     jobs: Jobs, machine: Runner, start: int, stop: int, times: np.ndarray, watch: bool, stopped: threading.Event
 ) -> Outcome:
-    """Integrate some jobs in lanes, until they are done or `stopped` is set."""
+    """Outcome of the jobs from `start` to `stop`, integrated in lanes until they are done or `stopped` is set."""
     call = Call(machine, jobs.tables(machine, start, stop, watch, False), stop - start, times)
     while call.run_steps(QUOTA) != 0 and not stopped.is_set():
         pass

@@ -45,7 +45,7 @@ class Event(Displayed):
     shear_stress: float
     spring_stress: float
     slip: float
-    contact: ClassVar[str] = ""  # the only one
+    contact: ClassVar[str] = ""  # the contact of a slider has no name
 
 
 @dataclass(frozen=True)
@@ -55,28 +55,28 @@ class SlipEvent(Displayed):
     The event begins where the block becomes faster than the load point, or at its lowest speed if it was faster before,
     and ends where it is slower again and rests: the spring is loaded by more than a tenth of the largest drop before
     it slips again. Its peak speed is at least twice that of the load point (of the rig's drive while the load point
-    rests) and twice its own at the beginning; it sheds at least a tenth of the largest drop so far, and an event after
-    it at most ten times as much as all before. Fast slip that sheds less rings; where it comes three times in a row
-    after rests and is alike, as after a knock, the count begins anew with the third. A backward stroke is an event of
-    its own, by the same definition with the speed.
+    rests) and twice its own at the beginning; its stress drop is at least a tenth of the largest so far, and that of a
+    later event at most ten times the largest before. Fast slip with a smaller drop is ringing; if three such slips in a
+    row, each after a rest, are alike, as after a knock, events are counted anew from the third. A backward stroke is an
+    event of its own, by the same definition with the absolute velocity.
 
     Attributes
     ----------
     begin, end, duration : float
         s.
     slip : float
-        m; negative of a backward stroke.
+        m; negative for a backward stroke.
     stress_drop : float
-        Fall of the spring stress, Pa, of a backward stroke its rise; never negative.
+        Fall of the spring stress (for a backward stroke its rise), Pa; never negative.
     peak_velocity, peak_time : float
         m/s (negative of a backward stroke) and s.
     recurrence : float
         Time since the beginning of the event before in the same direction, s; NaN for the first, and if that event
         began before the run.
     rings : int
-        How often the block is faster than the load point again, by the same factor of two, before the next event.
+        Number of times that the block is again faster than the load point, by a factor of two, before the next event.
     ring_frequency : float
-        One over the time between the last two of these, Hz; NaN for less than two.
+        1 over the time between the last two rings, Hz; NaN with fewer than two.
     """
 
     begin: float
@@ -89,7 +89,7 @@ class SlipEvent(Displayed):
     recurrence: float
     rings: int
     ring_frequency: float
-    contact: ClassVar[str] = ""  # the only one
+    contact: ClassVar[str] = ""  # the contact of a slider has no name
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class ContactEvent(Displayed):
 
 @dataclass(frozen=True)
 class ContactSlip(Displayed):
-    """`SlipEvent` of one contact of a machine; velocities are compared as shares of their values in steady sliding.
+    """`SlipEvent` of one contact of a machine; velocities are compared relative to those in steady sliding.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class ContactSlip(Displayed):
     slip : float
         m.
     force_drop : float
-        Fall of the pull during the event, N; of a backward stroke its rise.
+        Fall of the pull during the event (for a backward stroke its rise), N.
     peak_velocity, peak_time, recurrence, rings, ring_frequency : float
         As in `SlipEvent`.
     """
@@ -158,7 +158,7 @@ AnySlip = SlipEvent | ContactSlip
 def events_of(
     log: np.ndarray, contacts: Sequence[str] = ("",), areas: Sequence[float] = (1.0,)
 ) -> tuple[AnyEvent, ...]:
-    """Events of a kernel's log, in order of time."""
+    """Events of a kernel's log, in order of time, for contacts with names and areas (m²)."""
     each = len(LOG_KINDS) - 2
     found: list[AnyEvent] = []
     for number, *numbers in valid_rows(log)[:, [*range(7), NUMBER]].tolist():
@@ -169,10 +169,10 @@ def events_of(
 
 
 def valid_rows(log: np.ndarray) -> np.ndarray:
-    """Rows of a log in order of time, without begins and ends of slip events that later rows replace."""
+    """Rows of a log in order of time, without begins and ends of slip events that are replaced by later rows."""
     each = len(LOG_KINDS) - 2
     keep = np.ones(len(log), dtype=bool)
-    counted: dict[int, list[list[int]]] = {}  # rows of each event of a contact
+    counted: dict[int, list[list[int]]] = {}  # by contact: for each slip event the rows of its begin and end
     for i in np.flatnonzero(log[:, NUMBER] > 0).tolist():
         index, kind = divmod(int(log[i, 0]) - 1, each)
         events, number = counted.setdefault(index, []), int(log[i, NUMBER])
@@ -187,7 +187,7 @@ def valid_rows(log: np.ndarray) -> np.ndarray:
 
 
 def event_of(kind: str, contact: str, area: float, numbers: Sequence[float]) -> AnyEvent:
-    """Event from its kind and (time, velocity, σ, τ, T, slip)."""
+    """Event from its kind and (time, velocity, σ, τ, T, slip), SI units; `area` (m²) converts stresses to forces."""
     if not contact:
         return Event(kind, *numbers)
     time, v, sigma, tau, pull, slip = numbers
@@ -195,7 +195,7 @@ def event_of(kind: str, contact: str, area: float, numbers: Sequence[float]) -> 
 
 
 def slip_events(events: Sequence[AnyEvent]) -> tuple[AnySlip, ...]:
-    """Complete slip events of a run, without one that is still going on at the end."""
+    """Complete slip events of a run, in order of their ends, without events that go on at its end."""
     found: list[AnySlip] = []
     for name in dict.fromkeys(event.contact for event in events):
         found += _slips([one for one in events if one.contact == name])
@@ -225,7 +225,7 @@ def _slips(events: Sequence[AnyEvent]) -> list[AnySlip]:
 
 
 def _begun_anew(slips: Sequence[AnySlip]) -> Iterator[AnySlip]:
-    """Slip events, of which the first after a knock that shed far more has no known recurrence."""
+    """Yield slip events, with recurrence NaN for the first after one with a far larger drop (a knock)."""
     largest = 0.0
     for one in slips:
         anew = _drop(one) < EVENT_SHARE * largest
@@ -238,12 +238,13 @@ def _drop(slip: AnySlip) -> float:
 
 
 def _recurrence(begins: Sequence[AnyEvent]) -> float:
-    """Time from the begin before in the direction of the last one to the last one, s; NaN if that is not known."""
+    """Time (s) between the last begin and the one before in its direction; NaN if that is not known."""
     before = next((one.time for one in begins[-2::-1] if one.kind == begins[-1].kind), 0.0)
     return begins[-1].time - before if before > 0 else float("nan")
 
 
 def _slip(begin: AnyEvent, peak: AnyEvent, end: AnyEvent, recurrence: float, rings: Sequence[float]) -> AnySlip:
+    """Slip event from its begin, velocity peak and end, with the times (s) of its rings."""
     sign = BEGINS[begin.kind]
     often = 1 / (rings[-1] - rings[-2]) if len(rings) > 1 else float("nan")
     times = {"begin": begin.time, "end": end.time, "duration": end.time - begin.time, "slip": end.slip - begin.slip}
@@ -254,4 +255,4 @@ def _slip(begin: AnyEvent, peak: AnyEvent, end: AnyEvent, recurrence: float, rin
     if isinstance(begin, Event) and isinstance(end, Event):
         drop = sign * (begin.spring_stress - end.spring_stress)
         return SlipEvent(stress_drop=drop, rings=len(rings), **times, **top)
-    raise InternalError("events of one kind in a run")
+    raise InternalError("a slip event begins and ends with events of two types; this is a bug, please report it")

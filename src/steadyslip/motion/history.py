@@ -1,4 +1,4 @@
-"""Data of a run: content of saved files and base of `History`."""
+"""Data of a run: base class of `History`, and the content of its files."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     ----------
     rig : Slider or Machine
     protocol : Protocol
-        With its end.
+        Protocol of the run, with its end.
     data : dict of str to ndarray
-        Time ``t`` (s) and every observable, SI units. Where a jump happens, its time occurs twice if the
-        solver's own steps are kept.
+        Time ``t`` (s) and every observable, SI units. The time of a jump occurs twice if the solver's own steps are
+        recorded.
     units : dict of str to str
     events : tuple of Event or ContactEvent
-        In the order of time; `ContactEvent` of a machine.
+        Events in order of time; `ContactEvent` for a machine.
     status : str
         ``done``, ``contact lost``, ``blow-up``, ``stuck``, ``no velocity``, ``too many steps``,
         ``out of range`` (of floating point; samples stop before it), ``delay not resolved`` or ``interrupted``.
@@ -42,16 +42,18 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     method : str
         Integration method used.
     rtol : float
+        Relative error allowed per integration step.
     steps, rejected : int
+        Numbers of accepted and rejected steps.
     velocities : tuple of float
-        Lowest and highest velocity of the run, m/s, also between samples; of a machine, a dict of slip rates by
-        contact.
+        Lowest and highest velocity of the run, m/s, also between samples; for a machine, a dict of such pairs of slip
+        rates by contact.
     late_error : float
-        With a delay: relative change of slips, peaks and recurrences, and of the range of velocity, by a finer history
-        of what acts late; NaN without, and of loaded files. Infinite where slips agree at first and then part, as they
-        do by a smaller `rtol` too: the motion is irregular, and no two runs of it repeat each other.
+        With a delay: relative change of slips, peaks, recurrences and range of velocity if delayed signals have more
+        variables; NaN without a delay, and for loaded files. Infinite if slip events agree at first and then differ, as
+        with a smaller `rtol` too: the motion is irregular, and no two runs of it agree.
     version : str
-        Version of the program that computed it.
+        Version of the program that computed the run.
     """
 
     rig: Slider | Machine

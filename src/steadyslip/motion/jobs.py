@@ -42,15 +42,15 @@ METHOD_WORDS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name
 TIGHT_RTOL = (
     1e-5  # rtol up to which the explicit pair of order 8 is faster than that of order 5 (benchmarks/methods.py)
 )
-MOST_STAGES_SOLVED = 8  # most stages of a method in which balances are solved; compilation takes minutes for more
-BLOW_UP = np.exp(200.0)  # velocity over the drive's: bounded orbits reach e^14 and more (theory 7), none this
+MOST_STAGES_SOLVED = 8  # limit of stages of a method if equations are solved in each; more take minutes to compile
+BLOW_UP = np.exp(200.0)  # velocity over the drive's that counts as infinite; bounded orbits reach e^14 (theory 7)
 ROUNDING_DECIDES = (
-    "the forces on the block are so much larger than what its velocity makes of them that rounding decides how it "
+    "the forces on the block are so much larger than their change with its velocity that rounding decides how it "
     "moves; look for a parameter that is too small or too large by orders of magnitude (a, a damping, a friction level)"
 )
 NEEDS_STIFFNESS = (
-    "creep as a part of a run needs a stiffness between drive and body: a dashpot alone has no place from which the "
-    "drive could go on; give it one, or let creep last for the whole run (creep-step without creep)"
+    "creep as a part of a run needs a stiffness between drive and body, whose force determines where the drive "
+    "goes on, not a dashpot alone; give it one, or let creep last for the whole run (creep-step without creep)"
 )
 CONTACT_SHARE = 1e-9  # share of the steady normal stress below which contact counts as lost: the laws end at 0
 
@@ -64,13 +64,13 @@ class Options:
     method : str
         ``auto``, ``explicit``, ``rosenbrock`` or a method's own name.
     rtol : float
-        Error allowed per step, relative to each variable's size or scale; the scale is 1 for ln v.
+        Error allowed per step, relative to the size of each variable or to its scale (1 for ln v), if that is larger.
     most_steps : int
         Limit of steps.
     arrest : float
         Share of the drive velocity below which the block counts as arrested.
     order : int
-        Variables of each late signal (`steadyslip.model.dead_time`); 0 to choose it by the rig.
+        Number of variables of each delayed signal (`steadyslip.model.dead_time`); 0 to choose it by the rig.
     """
 
     method: str = "auto"
@@ -99,8 +99,9 @@ class Jobs:
     Attributes
     ----------
     point : OperatingPoint
-        Of all rigs, one-dimensional.
+        Operating points of all rigs, flat arrays.
     segments : Segments
+        Inputs of the jobs.
     initial : ndarray (jobs, continuous variables)
     velocity : ndarray (jobs,)
         Initial velocity, m/s.
@@ -108,13 +109,14 @@ class Jobs:
         Initial values of the variables to be solved for (`Reduction.searched`); NaN where unknown.
     reduction : Reduction
     eliminate : int or None
-        Memory variable that follows from the balance and is not integrated.
+        Index of the memory variable that follows from the balance of forces and is not integrated; of a machine one
+        for each contact.
     options : Options
     size : int
     targets : Targets
-        What the protocol acts on.
+        Targets of the pieces of the protocol.
     let_go : OperatingPoint, optional
-        Operating points while the drive is let go, if it is for some time.
+        Operating points during release of the drive, if the protocol releases it for some time.
     """
 
     point: OperatingPoint
@@ -131,12 +133,12 @@ class Jobs:
 
     @property
     def exists(self) -> np.ndarray:
-        """True for rigs with steady sliding to start from."""
+        """True (jobs,) for rigs with steady sliding to start from."""
         return np.atleast_1d(np.asarray(self.point.exists))
 
     @property
     def late_order(self) -> int:
-        """Number of variables of each late signal; 0 without delays."""
+        """Number of variables of each delayed signal; 0 without delays."""
         return self.reduction.model.late_order
 
     @property
@@ -151,17 +153,18 @@ class Jobs:
         return np.asarray(np.atleast_1d(in_range(self.point)) & resolved(self.point))
 
     def choice(self, lanes: int, dense: bool) -> Choice:
-        """Choice of the kernel for these jobs."""
+        """Kernel variant for these jobs: method, kind of inputs, lanes, dense output."""
         method = METHOD_WORDS[self.options.method] or automatic_method(self.reduction, self.options.rtol)
         harmonics = self.segments.amplitude.shape[-1]
         return Choice(method, self.segments.level(), harmonics, lanes, dense)
 
     def runner(self, lanes: int, dense: bool) -> Runner:
+        """Compiled kernel for these jobs."""
         acting = self.targets.pushes, self.targets.presses
         return runner(self.reduction.model, self.choice(lanes, dense), self.eliminate, *acting)
 
     def tables(self, machine: Runner, start: int, stop: int, watch: bool, record: bool) -> tuple[np.ndarray, ...]:
-        """Constants, initial values, settings and segments of the jobs from `start` to `stop`."""
+        """Kernel tables of the jobs from `start` to `stop`: constants, initial values, settings and segments."""
         point = self.point.part(slice(start, stop))
         initial = self.initial[start:stop] if len(self.initial) > 1 else self.initial
         velocity = self.velocity[start:stop] if len(self.velocity) > 1 else self.velocity
@@ -170,8 +173,8 @@ class Jobs:
             near = self.near[start:stop].T
             found = [np.where(np.isfinite(own), own, guess) for own, guess in zip(near, found, strict=False)] or found
         first, *others = found
-        ask = _cached_settings if point.size == 1 else _settings
-        settings = ask(point, machine, self.reduction, self.options)
+        make = _cached_settings if point.size == 1 else _settings
+        settings = make(point, machine, self.reduction, self.options)
         settings = settings.repeat(max(len(settings), np.size(first)) // len(settings), axis=0)
         settings[:, Setting.GUESS] = first
         for column, value in enumerate(others, start=Setting.ATOL + machine.kernel.size):
@@ -181,7 +184,7 @@ class Jobs:
 
 
 def _settings(point: OperatingPoint, machine: Runner, reduction: Reduction, options: Options) -> np.ndarray:
-    """Rows of settings, without those that depend on the start and on what is recorded."""
+    """Kernel settings (jobs, columns), without those that depend on the initial state and on recording."""
     scales, (unknown, *others) = natural_scales(point, reduction)
     sizes = np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[name]) for name in reduction.names)))
     speed = slip_rates(point)[0]
@@ -197,7 +200,7 @@ _cached_settings = cached(_settings)
 
 
 def numbers(drive: Any, stress: Any, x: Any, unknown: Any, options: Options) -> dict[str, Any]:
-    """Settings by name, from drive velocity, steady normal stress and natural scales: arrays, or nodes of a program."""
+    """Kernel settings by name, from drive velocity, steady normal stress and scales: arrays, or nodes of a program."""
     return {
         "rtol": options.rtol,
         "most_steps": options.most_steps,
@@ -214,8 +217,8 @@ def automatic_method(reduction: Reduction, rtol: float = np.inf) -> str:
     """Name of the method for `auto`: explicit for massless models in ln v or asinh, Rosenbrock for stiff others.
 
     Mass makes the stick phase stiff (rate a/m*), bristles the whole motion. Of the explicit pairs the one of order 8 is
-    faster at tight tolerances (`benchmarks/methods.py`), but takes minutes to compile if balances are solved in each of
-    its stages, or with the many variables of late signals.
+    faster at tight tolerances (`benchmarks/methods.py`), but takes minutes to compile if equations are solved in each
+    of its stages, or with the many variables of delayed signals.
     """
     kinds = [one.variable.kind for one in reduction.slidings if one.variable is not None]
     free = "loading" in reduction.model.inputs  # without a spring to stop it the block slides fast, which is stiff
@@ -234,7 +237,7 @@ def prepare(
     options: Options,
     branch: int = 0,
 ) -> Jobs:
-    """Check all arguments of runs and translate them to arrays.
+    """Jobs (arrays for kernels) from the arguments of runs, which are checked.
 
     Parameters
     ----------
@@ -247,9 +250,9 @@ def prepare(
     Raises
     ------
     ParameterError
-        If anything is wrong; lists every problem.
+        If any argument is not allowed; lists every problem.
     NotAvailable
-        If the rig cannot move as asked, or the numbers of a single rig leave the range of floating point.
+        If the laws or the drive of the rig exclude the run, or numbers of a single rig leave floating point.
     """
     own = {name: value for name, value in vary.items() if not name.startswith("protocol.")}
     plan = in_units_of(rig, Protocol.of(protocol)).varied(
@@ -286,12 +289,12 @@ def prepare(
 
 @cached
 def _taken_up_by(model: Model) -> ArrayFunction:
-    """Stiffness of the element that carries the force of a drive that is let go."""
+    """Compiled function: stiffness (if any) of the element that carries the force of a released drive (cached)."""
     return model.function([] if model.letting_go is None else [model.letting_go.stiffness])
 
 
 def _refuse_slow_to_compile(reduction: Reduction, method: str) -> None:
-    """Refuse a method with many stages where balances are solved in each, because it takes minutes to compile."""
+    """Raise ParameterError for a method that would take minutes to compile: many stages, equations solved in each."""
     if not reduction.unknowns or METHOD_WORDS[method] not in TABLEAUS:
         return
     stages = {name: make().stages for name, make in TABLEAUS.items()}
@@ -305,7 +308,7 @@ def _refuse_slow_to_compile(reduction: Reduction, method: str) -> None:
 
 
 def _refuse_singular(rig: Slider | Machine, point: OperatingPoint, varied: bool) -> None:
-    """Refuse rigs whose friction laws cannot be followed beyond small motions."""
+    """Raise NotAvailable for rigs whose friction laws are singular beyond small motions."""
     own = with_values(rig, point.named()) if varied else rig
     for laws in own.laws_by_contact().values():
         for condition in laws.friction.motion_conditions():

@@ -1,4 +1,4 @@
-"""Check of motion with delays: the same run by more variables of every late signal (`steadyslip.model.dead_time`)."""
+"""Check of runs with delays against runs with more variables of each delayed signal (`steadyslip.model.dead_time`)."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from steadyslip.motion.result import History
 from steadyslip.motion.status import BLOWN_UP
 
 LATE_TOLERANCE = 0.01
-"""Largest relative change of slips, their peaks and the times between, or of the range of velocity."""
+"""Largest relative change allowed of slips, their peaks and the times between them, or of the range of velocity."""
 NAMES = ("slip", "peak_velocity", "recurrence")
 FEWEST = 3
-"""Slips that must agree before runs part: a slip, and two times between slips."""
+"""Least number of leading slip events that must agree in irregular motion: with two times between them."""
 STILL = 1e-6  # range of velocity over the largest below which a motion counts as steady: ten times the default rtol
 
 
@@ -22,12 +22,12 @@ def late_error(run: History, finer: History) -> float:
     if run.status != finer.status:
         return np.inf
     found = [abs(run.end - finer.end) / run.end]
-    if run.status != BLOWN_UP:  # where the highest velocity is that of the last step
+    if run.status != BLOWN_UP:  # in a blow-up the highest velocity is that of the last step
         first, second = _extremes(run), _extremes(finer)
         moving = np.maximum(np.ptp(first, axis=1), STILL * np.abs(first).max(axis=1))
         found.append(float(np.max(np.abs(first - second) / moving[:, None])))
     events, others = run.slip_events, finer.slip_events
-    if abs(len(events) - len(others)) > 1:  # one may begin or end with the run
+    if abs(len(events) - len(others)) > 1:  # one event may be cut off by the start or end of the run
         return np.inf
     for one, other in zip(events, others, strict=False):
         found += [float(_apart(getattr(one, name), getattr(other, name))) for name in NAMES]
@@ -35,10 +35,10 @@ def late_error(run: History, finer: History) -> float:
 
 
 def parts_anyway(run: History, finer: History, closer: History) -> bool:
-    """True if single slips cannot be repeated, as in chaotic motion, whatever is done about the delay.
+    """True if slip events depend on any change of accuracy, as in chaotic motion, not only on that of the delay.
 
-    `finer` has more variables of every late signal, `closer` a smaller rtol. The first slips agree with both; with the
-    former for half as long, at least, as with the latter.
+    `finer` has more variables of every delayed signal, `closer` a smaller rtol. The first slip events agree with
+    `closer`, but not all, and with `finer` for at least half as many.
     """
     alike = _alike(run, finer)
     own = min(len(run.slip_events), len(closer.slip_events))
@@ -76,7 +76,7 @@ def _extremes(run: History) -> np.ndarray:
 
 
 def _apart(one: float | np.ndarray, other: float | np.ndarray) -> np.ndarray:
-    """Relative difference; 0 where both are missing or zero, infinite where one is."""
+    """Relative difference; 0 where both are NaN or equal, infinite where only one is NaN or zero."""
     with np.errstate(all="ignore"):
         apart = np.abs(np.subtract(one, other)) / np.abs(one)
     neither = (np.isnan(one) & np.isnan(other)) | (np.equal(one, other))

@@ -86,8 +86,8 @@ class Ensemble(ReadOnly):
         Per run: number of complete slip events (see `SlipEvent`), highest and lowest velocity; begin, duration, slip,
         stress drop, peak velocity, recurrence, rings and ring frequency of the last complete event; number of arrests
         and velocity peaks, time of the last peak, period between the last two, growth of |ln(peak velocity/drive)|
-        between them. Without events, duration, slip, stress drop and rings are 0, times and velocities NaN. Empty
-        unless asked for. For a machine, these for each contact, prefixed with its name, and force drop (N) in place of
+        between them. Without events, duration, slip, stress drop and rings are 0, times and velocities NaN. Empty with
+        ``events=False``. For a machine, these for each contact, prefixed with its name, and force drop (N) in place of
         stress drop.
     samples : dict of str to ndarray
         Observables at `times`, which is the last axis; NaN after the end of a run.
@@ -118,9 +118,9 @@ class Ensemble(ReadOnly):
 
     @property
     def contact(self) -> np.ndarray:
-        """Contact of a machine that lifted off, for runs that ended so; empty elsewhere.
+        """Contact of a machine that lifted off, for runs with status ``contact lost``; empty for others.
 
-        Empty everywhere if normal forces are not among the observables.
+        Empty for all runs if normal forces are not among the observables.
         """
         lost = self.status_code == WORDS.index("contact lost")
         names = [name.removesuffix(NORMAL_FORCE) for name in self.final if name.endswith(NORMAL_FORCE)]
@@ -137,10 +137,10 @@ class Ensemble(ReadOnly):
         return f"{self.status_code.size} runs: " + ", ".join(parts)
 
     def _lifted(self, code: int) -> str:
-        """Contacts that lifted off, with the number of runs of each."""
+        """Format the contacts that lifted off in runs of a status, with the number of runs of each."""
         names, counts = np.unique(self.contact[self.status_code == code], return_counts=True)
-        told = [f"{name} {count}" for name, count in zip(names, counts, strict=True) if name]
-        return f" ({', '.join(told)})" if told else ""
+        parts = [f"{name} {count}" for name, count in zip(names, counts, strict=True) if name]
+        return f" ({', '.join(parts)})" if parts else ""
 
     def __str__(self) -> str:
         return self.summary()
@@ -186,10 +186,10 @@ def simulate_many(
     progress: bool | None = None,
     branch: int = 0,
 ) -> Ensemble:
-    """Integrate many variants of a rig in parallel.
+    """Motions of many variants of a rig, integrated in parallel.
 
-    Results do not depend on the number of threads or on which other runs there are. They agree with `simulate` within
-    its tolerance; step sizes follow the same rule but round differently, so that a few steps may differ.
+    Results do not depend on the number of threads or on the other runs. They agree with `simulate` within its
+    tolerance; step sizes are rounded differently, so that a few steps may differ.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def simulate_many(
     observables : sequence of str, optional
         Observables to keep in `final` and `samples`; by default all.
     events : bool, optional
-        True to gather event statistics; without them runs are some tenths faster.
+        True to compute event statistics; without them runs take some tenths less time.
     threads : int, optional
         Number of threads; by default all cores.
     progress : bool, optional
@@ -252,14 +252,14 @@ def simulate_many(
                 if not store.check_late(finer, index, count, requested, threads):
                     break
     if store is None:
-        raise InternalError("at least one group of runs")
+        raise InternalError("an ensemble has no runs; this is a bug, please report it")
     return store.result(shape, together.dims or (), together.coords)
 
 
 def broadcast_arrays(
     rig: Slider | Machine, plan: Protocol, vary: Mapping[str, Any], initial: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, Any], BroadcastArrays]:
-    """Flat arrays of equal length by full name, those of starting values, and the rule of broadcasting."""
+    """Flat arrays of equal length: of parameters by full name, of initial values by name; and their broadcast shape."""
     known = dict.fromkeys([*rig.parameters(), *parameters(plan, "protocol.")])
     problems, named = [], {}
     for name, value in vary.items():
@@ -288,7 +288,10 @@ def _at(array: Any, index: np.ndarray | None) -> Any:
 
 
 def regimes(rig: R, flat: dict[str, Any], size: int) -> Iterator[tuple[R, dict[str, Any], np.ndarray | None]]:
-    """Group the runs by which structural parameters (mass, B0, ...) are zero, because the equations differ."""
+    """Yield groups of runs with equal equations: rig, parameters and indices (None for all).
+
+    Equations differ between runs in which different structural parameters (mass, B0, ...) are zero.
+    """
     structural = [
         name
         for name, value in flat.items()
@@ -336,7 +339,7 @@ class _Store:
         ]
         if problems:
             raise ParameterError(problems)
-        self.watch, self.told, self.times = events or jobs.late_order > 0, events, times
+        self.watch, self.keeps_events, self.times = events or jobs.late_order > 0, events, times
         self.code = np.full(size, INTERRUPTED, dtype=np.int8)
         self.end = np.full(size, np.nan)
         self.steps = np.zeros(size, dtype=np.int64)
@@ -393,7 +396,7 @@ class _Store:
     def check_late(
         self, jobs: Jobs, index: np.ndarray | None, size: int, times: np.ndarray, threads: int | None
     ) -> bool:
-        """Run again with a finer history of what acts late, and mark runs that differ; False if interrupted."""
+        """Repeat runs with more variables of delayed signals and mark those that differ; False if Ctrl-C ended it."""
         finer = _Store(jobs, len(self.code), times, (), True)
         if not _run(jobs, finer, index, size, times, threads, None):
             return False
@@ -410,7 +413,8 @@ class _Store:
 
         return Ensemble(
             shaped(self.code), shaped(self.end), shaped(self.steps), shaped(self.rejected),
-            {n: shaped(a) for n, a in self.final.items()}, {n: shaped(a) for n, a in self.events.items() if self.told},
+            {n: shaped(a) for n, a in self.final.items()},
+            {n: shaped(a) for n, a in self.events.items() if self.keeps_events},
             {n: shaped(a) for n, a in self.samples.items()}, self.times, self.units, dims, coords,
         )  # fmt: skip
 
@@ -419,6 +423,7 @@ def _run(
     jobs: Jobs, store: _Store, index: np.ndarray | None, size: int, times: np.ndarray, threads: int | None,
     advanced: Callable[[int], None] | None,
 ) -> bool:  # fmt: skip
+    """Integrate jobs in chunks and store their results; False if Ctrl-C ended it early."""
     machine = jobs.runner(LANES, dense=store.watch or len(times) > 0)
     lock = threading.Lock()
 

@@ -24,15 +24,15 @@ Tables = tuple[np.ndarray, ...]
 OBSERVED = ("v", "acceleration", "normal_stress", "shear_stress", "spring_stress", "load_velocity",
             "load_displacement")  # fmt: skip
 """Outputs of the driver's `observe` for each contact, in this order."""
-LOADING = "loading of the drive"  # imposed force on the drive; keys of intermediate values, not in results
-WAY, LOAD = "way of the drive", "velocity of the drive"  # of a contact; keys of intermediate values
+LOADING = "loading of the drive"  # key of an intermediate value, not in results: imposed force on the drive
+WAY, LOAD = "way of the drive", "velocity of the drive"  # as LOADING, for a contact: displacement and velocity
 STRESSES = ("normal_stress", "shear_stress", "spring_stress")
-UNSEEN = ("held", "past")  # kinds of variables that are not among the results
+UNSEEN = ("held", "past")  # kinds of variables that are not in results
 EXTRA_UNITS = {"slip": "m", "load_displacement": "m", "acceleration": "m/s^2", "load_velocity": "m/s"}
 
 
 def observable_units(model: Model, acting: Targets) -> dict[str, str]:
-    """Names and SI units of all observables of a run, for a model and what its protocol acts on."""
+    """SI units of all observables of a run, by name, for a model and the targets of its protocol."""
     if model.contacts[0].name:
         return _machine_units(model, acting)
     units = (
@@ -45,7 +45,7 @@ def observable_units(model: Model, acting: Targets) -> dict[str, str]:
 
 
 def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
-    """Names and units for a machine: by body and by contact, in forces."""
+    """SI units of the observables of a machine, by name with that of the body or contact; forces, not stresses."""
     units: dict[str, str] = {}
     for one in model.coordinates:
         if one.inner:
@@ -60,7 +60,7 @@ def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
     for contact in model.contacts:
         units |= {f"{contact.name}.slip": "m", f"{contact.name}.slip_rate": "m/s"}
     unit = model.roles["drive.velocity"].unit.removesuffix("/s")
-    turning = "rad" if all(one.unit == "rad" for one in model.coordinates) else "m"  # where nothing is pushed
+    turning = "rad" if all(one.unit == "rad" for one in model.coordinates) else "m"  # if nothing is pushed
     ways = {LOAD_POINT: unit} | {one.name: one.unit for one in model.coordinates} | dict.fromkeys(model.points, "m")
     units |= {"load_displacement": unit, "load_velocity": f"{unit}/s"}
     for name, (_, kind, on) in acting.named().items():
@@ -73,7 +73,7 @@ def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
 
 
 def out_of_range(found: dict[str, Array]) -> Array:
-    """True where any observable is infinite or NaN."""
+    """True (points,) where any observable is infinite or NaN."""
     first, *others = found.values()
     good: Array = np.isfinite(first)
     for values in others:
@@ -81,8 +81,8 @@ def out_of_range(found: dict[str, Array]) -> Array:
     return ~good
 
 
-def _given(model: Model) -> dict[sp.Symbol, str]:
-    """Symbols that observables are computed from, with their names among the results."""
+def _arguments(model: Model) -> dict[sp.Symbol, str]:
+    """Symbols from which observables are computed, with their names in results."""
     given: dict[sp.Symbol, str] = {}
     for one in model.coordinates:
         own = f"{one.name}." if model.contacts[0].name else ""
@@ -104,8 +104,8 @@ def _given(model: Model) -> dict[sp.Symbol, str]:
 
 @cached
 def _function(model: Model) -> tuple[list[str], list[str], ArrayFunction]:
-    """Names of computed observables, names of their arguments, and the function from these to those."""
-    given = _given(model)
+    """Names of computed observables, names of their arguments, and the compiled function (cached)."""
+    given = _arguments(model)
     known = set(given.values())
     names = [n for n in model.observables if n not in known]
     return names, list(given.values()), model.function((model.observables[n][0] for n in names), *given)
@@ -115,17 +115,17 @@ def observe(
     jobs: Jobs, machine: Runner, first: int, lane: Array, segment: Array, time: Array, points: Array,
     tables: Tables | None = None,
 ) -> dict[str, Array]:  # fmt: skip
-    """Compute all observables at given points.
+    """All observables (points,), by name, at points of runs.
 
     Parameters
     ----------
     first : int
-        Job of lane 0.
+        Index of the job of lane 0.
     lane, segment : ndarray of int (points,)
     time : ndarray (points,)
         Time since the start of the run, s.
     points : ndarray (points, 1 + state + further unknowns)
-        Points with unknowns of the balances (NaN where not known) before and after the state: see `Sampled`.
+        States with solutions of the algebraic equations (NaN where not known) before and after: see `Sampled`.
     tables : tuple of ndarray, optional
         Tables of the jobs from `first` on, if they are already computed.
     """
@@ -169,19 +169,19 @@ def observe(
 
 @cached
 def _load_point_lead(model: Model) -> ArrayFunction:
-    """Displacement of a let-go drive's load point ahead of steady motion, and its rate."""
+    """Compiled function: lead of a released drive's load point over steady motion, and its rate (cached)."""
     own = model.letting_go
     if own is None:
-        raise InternalError("a drive that is let go")
+        raise InternalError("the drive of this model is never let go; this is a bug, please report it")
     given = _function(model)[1]
-    names = {name: symbol for symbol, name in _given(model).items()}
+    names = {name: symbol for symbol, name in _arguments(model).items()}
     return model.function([own.ahead, own.speed], *(names[name] for name in given), own.loading_rate)
 
 
 def _shift_to_load_point(
     model: Model, found: dict[str, Array], point: OperatingPoint, ahead: Array, speed: Array
 ) -> None:
-    """Refer displacements to the load point where it is, ahead of steady motion while the drive is let go."""
+    """Refer displacements to the actual load point, which is ahead of steady motion by `ahead` after a release."""
     found["load_displacement"] = found["load_displacement"] + ahead
     found["load_velocity"] = found["load_velocity"] + speed
     shares = point.evaluate(_shares(model))[len(model.contacts) :]
@@ -205,7 +205,7 @@ def _at_contacts(model: Model, values: Array) -> dict[str, Array]:
 
 @cached
 def _shares(model: Model) -> ArrayFunction:
-    """Slip rates of contacts and speeds of coordinates in steady sliding, over the velocity of the drive."""
+    """Compiled function: steady slip rates of contacts, then speeds of coordinates, over drive velocity (cached)."""
     drive = model.steady[model.inputs["load_velocity"]]
     speeds = [model.steady[contact.velocity] for contact in model.contacts]
     return model.function(speed / drive for speed in (*speeds, *(one.speed for one in model.coordinates)))

@@ -1,4 +1,4 @@
-"""Words for what a protocol does, and the parameters that it changes."""
+"""Text for the pieces of a protocol, and the parameters that a protocol changes."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from steadyslip.machine.rig import Rig
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS, Piece
 
-_MOST = 4  # pieces that are told one by one in `protocol_words`, so that it stays a line or two (by trial)
+_MOST = 4  # number of pieces that `protocol_words` lists, so that it is a line or two (by trial)
 
 
 def piece_words(rig: Rig, piece: Piece) -> tuple[str, list[str]]:
-    """Name of a piece, and the values given to it, with units: ``("velocity step", ["at 10 s", "to 2 um/s"])``."""
+    """Name and fields of a piece, formatted with units: ``("velocity step", ["at 10 s", "to 2 um/s"])``."""
     turns, area = rig.parameters()["drive.velocity"].role.unit == "rad/s", rig.protocol_area
     items = []
     for item, role in own_fields(type(piece)):
@@ -34,10 +34,10 @@ def piece_words(rig: Rig, piece: Piece) -> tuple[str, list[str]]:
 
 
 def protocol_words(rig: Rig, protocol: Protocol) -> str:
-    """Pieces of a protocol in a line: ``"velocity step at 10 s, to 2 um/s; hold at 50 s, duration 10 s"``."""
-    told = [f"{name} {', '.join(items)}" for name, items in (piece_words(rig, one) for one in protocol.pieces[:_MOST])]
+    """Format a protocol in a line: ``"velocity step at 10 s, to 2 um/s; hold at 50 s, duration 10 s"``."""
+    parts = [f"{name} {', '.join(items)}" for name, items in (piece_words(rig, one) for one in protocol.pieces[:_MOST])]
     more = len(protocol.pieces) - _MOST
-    return "; ".join([*told, *([f"{more} more"] if more > 0 else [])])
+    return "; ".join([*parts, *([f"{more} more"] if more > 0 else [])])
 
 
 def changed_by(rig: Rig, protocol: Protocol) -> list[str]:

@@ -23,8 +23,8 @@ from steadyslip.motion.history import HistoryData
 from steadyslip.motion.sentence import drop_of, joined, oscillations, sentences
 from steadyslip.motion.status import remedy
 
-NUDGED, FASTER = 0.1, 1.1  # when (share of a run) and by what factor a step of the drive's velocity is suggested
-STEADY_SPREAD = 1e-4  # relative spread of velocity up to which a run counts as steady: below the digits that are told
+NUDGED, FASTER = 0.1, 1.1  # time (share of a run) and factor of the suggested step of the drive's velocity
+STEADY_SPREAD = 1e-4  # relative spread of velocity up to which a run counts as steady: below the printed digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     @property
     def message(self) -> str:
-        """Status in a sentence, with advice where the run ended early."""
+        """Sentence on status and end of the run, with advice if it ended early."""
         where = f" ({self.contact})" if self.contact else ""
         head = f"{self.status}{where} at {format_quantity(self.end, 's')}"
         advice = remedy(self.status, self.rig)
@@ -57,9 +57,10 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     @cached_property
     def sentence(self) -> str:
-        """What the rig does, by its slip events, as "judders: every 4.92 s it sticks, then slips 33.2 um ...".
+        """Sentence on the slip events, as "judders: every 4.92 s it sticks, then slips 33.2 um ...".
 
-        Without slip events in its last half by its oscillation there, as "oscillates: every 75.5 s between ...".
+        Without slip events in the last half of the run, on the oscillation in that half, as "oscillates: every 75.5 s
+        between ...".
         """
         return joined(self.rig, self._sentences)
 
@@ -73,7 +74,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         return slips | {name: f"{slips[name]}; then {own}" if name in slips else own for name, own in swings.items()}
 
     def summary(self) -> str:
-        """Summary in a few lines."""
+        """Text of a few lines: status, velocities, stresses, slip events and solver."""
         lines = [f"{self.message}", *self._contacts(), *self._block()]
         until = self.protocol.until or np.inf
         begins = [(piece.name, float(getattr(piece, "at", 0.0))) for piece in self.protocol.pieces]
@@ -81,7 +82,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             lines.append(f"left out        {', '.join(late)}: the run is to end at {format_quantity(until, 's')}")
         lines += self._caveats()
         arrests = sum(event.kind == "arrest" for event in self.events)
-        if arrests and not self.slip_events:  # between slips a contact that rings is arrested many times
+        if arrests and not self.slip_events:  # a ringing contact is arrested many times between slip events
             lines.append(f"arrests         {arrests}")
         lines.append(f"solver          {self.method}, rtol {self.rtol:g}, {self.steps} steps, {self.rejected} rejected")
         if other := of_another(self.version):
@@ -90,7 +91,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     @property
     def undisturbed(self) -> bool:
-        """True if nothing disturbed steady sliding, which then goes on even if it is unstable."""
+        """True if nothing disturbed steady sliding, so that the run does not show whether it is stable."""
         acts = any(float(getattr(piece, "at", 0.0)) < self.end for piece in self.protocol.pieces)
         known = self.velocities.values() if isinstance(self.velocities, dict) else [self.velocities]
         still = all(high - low <= STEADY_SPREAD * abs(high) for low, high in known)
@@ -98,7 +99,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     @property
     def nudge(self) -> tuple[str, str]:
-        """Pieces of a protocol, as text: the drive is faster by a tenth for a tenth of the run, then as before."""
+        """Two protocol pieces as text: the drive is faster by a tenth for a tenth of the run, then as before."""
         value, unit = self.rig.display_value("drive.velocity", float(self.rig.drive.velocity))
         begin, end = (format_quantity(share * self.end, "s") for share in (NUDGED, 2 * NUDGED))
         faster = format_quantity(FASTER * value, unit)
@@ -116,11 +117,11 @@ class History(HistoryData):  # noqa: D101 -- its base has it
                 "delay           resolved; single slips part with any change of accuracy, as the motion is irregular"
             )
         elif np.isfinite(self.late_error):
-            told = 100 * max(self.late_error, self.rtol)
-            lines.append(f"delay           slips, peaks, times between and velocities are known within {told:.1g} %")
+            error = 100 * max(self.late_error, self.rtol)
+            lines.append(f"delay           slips, peaks, times between and velocities are known within {error:.1g} %")
         if self.undisturbed:
             lines += [
-                "disturbance     none: steady sliding goes on, were it unstable too; analyze tells, or disturb it:",
+                "disturbance     none: steady sliding goes on even if it is unstable; run analyze, or disturb it:",
                 f'                --protocol "{self.nudge[0]}"',
             ]
         return lines
@@ -235,25 +236,19 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         matplotlib.axes.Axes or array of them
         """
         if contact is not None and kind == "history":
-            raise ParameterError([Problem("contact", f"got {contact!r}; a history shows all, a phase plane one")])
+            raise ParameterError([Problem("contact", f"got {contact!r}; allowed only with kind='phase'")])
         return draw(self, kind, ax=ax, **({} if contact is None else {"contact": contact}))
 
 
 def check_contact(rig: Slider | Machine, contact: str | None) -> None:
-    """Raise an error if the rig has no contact of this name, whose phase plane could be drawn.
-
-    Raises
-    ------
-    ParameterError
-        With the names of the contacts.
-    """
+    """Raise ParameterError, with the names that are allowed, if `contact` is given and is no contact of the rig."""
     if problems := rig.place_problems("contact", contact, rig.contacts, "contact"):
         raise ParameterError(problems)
 
 
 @checked()
 def load_history(path: str | PathLike[str]) -> History:
-    """Read a history that `History.save` wrote.
+    """History from a file written by `History.save`.
 
     Nothing in the file is executed; the content is verified.
 

@@ -1,4 +1,4 @@
-"""What a motion does, in one sentence, from its slip events, or without them from its oscillation."""
+"""Sentence on a motion, from its slip events, or without them from its oscillation."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ JUDDERS = {
     "rings": "; rings {rings} times at {often}",
     "backward": "; backward strokes {backward}, the last {back} within {during}",
 }
-"""Parts of the sentence, with holes that Python and the page fill."""
+"""Templates of the sentence, which Python and the browser page fill."""
 OSCILLATES = "oscillates: every {every} between {speeds}"
-"""An oscillation that goes on without slip events."""
+"""Template of the sentence on a steady oscillation without slip events."""
 GROWS = {True: "oscillates more and more", False: "leaves steady sliding"}
-"""What a disturbance that grows does, by whether it oscillates."""
+"""Begin of the sentence on a growing disturbance: with oscillation (True), or without."""
 ON = ": after {time} between {speeds}, and still growing"
-"""A motion whose growth has no end in a run."""
+"""End of the sentence on a disturbance that grows up to the end of the run."""
 CREEPS = ", at up to {peak}"
-"""Speed of an event most of whose time is creep: its peak is `SUDDEN` times its mean."""
+"""Addition for an event that is mostly creep: its peak velocity is more than `SUDDEN` times its mean."""
 DIFFERS = " ({before} the time before)"
-"""Slip of the forward event before the last, where it differs by more than `ALIKE`."""
-DIGITS = 3  # significant, of quantities in sentences
-TREND = 0.01  # relative growth or decay of swings in the last half of a run up to which they go on
-LAST = 0.9  # share of a run after which swings that grew before must be alike if they have come to an end
-BEATS = 1.2  # ratio of the largest to the smallest swing of an oscillation that goes on, which may beat; by trial
-SUDDEN = 10.0  # peak over mean speed of an event; a half sine has 1.6, stick-slip without creep before it 2 to 4
-OVER = 2.0  # times the longest recurrence of late without another event, after which events have come to an end
+"""Addition with the slip of the forward event before the last, if it differs by more than `ALIKE`."""
+DIGITS = 3  # significant digits of quantities in sentences
+TREND = 0.01  # relative growth or decay of swings in the last half of a run up to which an oscillation is steady
+LAST = 0.9  # share of a run after which swings that grew before must be alike for an oscillation to be steady
+BEATS = 1.2  # largest ratio of swings of a steady oscillation, which may beat; by trial
+SUDDEN = 10.0  # ratio of peak to mean velocity of an event; a half sine has 1.6, stick-slip without creep 2 to 4
+OVER = 2.0  # time without an event, in longest late recurrences, after which events have come to an end
 ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
 
 
 def pull_words(rig: Slider | Machine, contact: str) -> str:
-    """What pulls at a contact, as "the pull of belt" or "the torque of worm on mount"; empty for a slider."""
+    """Name of the pull at a contact, as "the pull of belt" or "the torque of worm on mount"; empty for a slider."""
     links = " and ".join(rig.pulls_at(contact))
     turns = rig.lever_at(contact) is not None
     return (
@@ -55,7 +55,7 @@ def pull_words(rig: Slider | Machine, contact: str) -> str:
 
 
 def drop_of(slip: ContactSlip, lever: float | None) -> tuple[float, str]:
-    """Fall of what pulls at a contact and its unit: a torque where the body turns, at a radius of `lever` (m)."""
+    """Drop of the pull in a slip event, and its unit: N, or N m if the body turns, at a radius of `lever` (m)."""
     return (slip.force_drop, "N") if lever is None else (slip.force_drop * lever, "N m")
 
 
@@ -65,23 +65,22 @@ def sentence(
 ) -> str:  # fmt: skip
     """Sentence on the slip events of a block or contact; empty if there are none.
 
-    It tells of the last forward event: how long after the one before, how far, how fast, how much the spring sheds, how
-    far the one before slipped if that differs, and how it rings; and of the last backward stroke. The block *sticks* if
-    it was arrested since the event before, else it *lags* behind the load point. It *judders* if events go on; long
-    after the last one it slips no more.
+    It describes the last forward event (recurrence, slip, duration, drop, slip of the one before if that differs, and
+    ringing) and the last backward stroke. The block *sticks* if it was arrested since the event before, else it *lags*
+    behind the load point. It *judders* if events go on; long after the last one it slips no more.
 
     Parameters
     ----------
     events, slips
-        Of one block or contact.
+        Events of one block or contact.
     area : float, optional
-        Of a slider's contact, m², if forces are told.
+        Area of a slider's contact, m², to report forces in place of stresses.
     pull : str
-        What pulls at a machine's contact and sheds the force (`pull_words`).
+        Name of the pull at a machine's contact (`pull_words`).
     since : float
-        Time from which forward events are told by their ranges, s; the last alone by default.
+        Time (s) from which forward events are reported by their ranges; by default the last event alone.
     end : float
-        Of the run, s; events may go on by default.
+        End of the run, s; by default events may go on.
     lever : float, optional
         `Rig.lever_at` of a machine's contact, m.
     """
@@ -89,37 +88,38 @@ def sentence(
         return ""
     back = [one for one in slips if one.slip < 0]
     last = next((one for one in reversed(slips) if one.slip > 0), back[-1] if back else slips[-1])
-    told = [one for one in slips if one.slip > 0 and one.begin > since] or [last]
+    some = [one for one in slips if one.slip > 0 and one.begin > since] or [last]
     if isinstance(last, ContactSlip):
-        drops = [drop_of(one, lever) for one in told if isinstance(one, ContactSlip)]
-        drop = _told([value for value, _ in drops], drops[0][1])
+        drops = [drop_of(one, lever) for one in some if isinstance(one, ContactSlip)]
+        drop = _format([value for value, _ in drops], drops[0][1])
         drop = JUDDERS["of"].format(drop=drop, pull=pull) if pull else drop
     else:
-        drop = _told([one.stress_drop for one in told if not isinstance(one, ContactSlip)], "Pa", area)
+        drop = _format([one.stress_drop for one in some if not isinstance(one, ContactSlip)], "Pa", area)
     holes = {
-        "every": _told([one.recurrence for one in told if math.isfinite(one.recurrence)] or [math.nan], "s"),
+        "every": _format([one.recurrence for one in some if math.isfinite(one.recurrence)] or [math.nan], "s"),
         "waits": JUDDERS["sticks" if _stuck(events, last) else "lags"],
-        "slip": _told([abs(one.slip) for one in told], "m"), "within": _told([one.duration for one in told], "s"),
-        "drop": drop, "rings": str(last.rings), "often": _told([last.ring_frequency], "Hz"), "backward": str(len(back)),
-        "count": str(len([one for one in slips if one.slip > 0])), "ended": _told([last.end], "s"),
+        "slip": _format([abs(one.slip) for one in some], "m"), "within": _format([one.duration for one in some], "s"),
+        "drop": drop, "rings": str(last.rings), "often": _format([last.ring_frequency], "Hz"),
+        "backward": str(len(back)), "count": str(len([one for one in slips if one.slip > 0])),
+        "ended": _format([last.end], "s"),
     }  # fmt: skip
     over = end - last.end > OVER * _longest(slips, last, end)
     words = JUDDERS["over" if over else "again" if math.isfinite(last.recurrence) else "alone"]
     if last.peak_velocity > SUDDEN * last.slip / last.duration > 0:
-        words += CREEPS.format(peak=_told([last.peak_velocity], "m/s"))
+        words += CREEPS.format(peak=_format([last.peak_velocity], "m/s"))
     before = next((one for one in reversed(slips[: slips.index(last)]) if one.slip > 0), last)
     if since == math.inf and not over and not math.isclose(before.slip, last.slip, rel_tol=ALIKE):
-        words += DIFFERS.format(before=_told([before.slip], "m"))
+        words += DIFFERS.format(before=_format([before.slip], "m"))
     if math.isfinite(last.ring_frequency):
         words += JUDDERS["rings"]
     if back:
-        holes |= {"back": _told([abs(back[-1].slip)], "m"), "during": _told([back[-1].duration], "s")}
+        holes |= {"back": _format([abs(back[-1].slip)], "m"), "during": _format([back[-1].duration], "s")}
         words += JUDDERS["backward"]
     return words.format(**holes)
 
 
 def _longest(slips: Sequence[AnySlip], last: AnySlip, end: float) -> float:
-    """Longest recurrence (s) of the forward events in the last half of a run, that of the last one at least."""
+    """Longest recurrence (s) of the last forward event and those in the last half of a run."""
     late = [one.recurrence for one in slips if one.slip > 0 and one.begin > 0.5 * end and math.isfinite(one.recurrence)]
     return max([last.recurrence, *late])
 
@@ -137,13 +137,13 @@ def sentences(
 
 
 def joined(rig: Slider | Machine, sentences: Mapping[str, str]) -> str:
-    """One sentence from those of the contacts, each after the contact's name, or the body's whose contacts agree."""
+    """One sentence from those of the contacts, by name of the contact, or of the body if all its contacts agree."""
     held = {name: rig.contacts[name].held if name in rig.contacts else name for name in sentences}
-    told: dict[str, set[str]] = {}
+    by_body: dict[str, set[str]] = {}
     for name, words in sentences.items():
-        told.setdefault(held[name], set()).add(words)
+        by_body.setdefault(held[name], set()).add(words)
     several = Counter(held.values())
-    found = {held[name] if several[held[name]] > 1 and len(told[held[name]]) == 1 else name: words
+    found = {held[name] if several[held[name]] > 1 and len(by_body[held[name]]) == 1 else name: words
              for name, words in sentences.items()}  # fmt: skip
     return "; ".join(f"{name} {words}" if name else words for name, words in found.items())
 
@@ -151,7 +151,7 @@ def joined(rig: Slider | Machine, sentences: Mapping[str, str]) -> str:
 class Swings(NamedTuple):
     """Oscillation of a contact at the end of a run: mean period (s), lowest and highest velocity (m/s), trend.
 
-    The trend is the relative growth of the swings there; 0 where they become larger and smaller by turns.
+    The trend is the relative growth of the swings (peak less trough); 0 if they alternately grow and shrink.
     """
 
     period: float
@@ -161,7 +161,7 @@ class Swings(NamedTuple):
 
 
 def steady_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
-    """Oscillation of each contact whose swings are alike in the last half of a run, or have come to an end, by name."""
+    """Oscillation of each contact whose swings are alike in the last half of a run, or after growth at its end."""
     found = {}
     for name in dict.fromkeys(one.contact for one in events):
         peaks, troughs = _extremes(events, name, LAST * end if _settled(events, name, end) else 0.5 * end)
@@ -174,9 +174,9 @@ def steady_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
 
 
 def growing_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
-    """Last swing of each contact that swings more than half a run before, and goes on growing, by name.
+    """Last swing of each contact whose swings grow in the last half of a run and up to its end, by name.
 
-    Beats that die out grow by turns, too, but not beyond those of the second quarter (the first has the disturbance).
+    Decaying beats grow at times, too, but not beyond those of the second quarter (the first has the disturbance).
     """
     found = {}
     for name in dict.fromkeys(one.contact for one in events):
@@ -191,9 +191,9 @@ def growing_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
 
 
 def _settled(events: Sequence[AnyEvent], name: str, end: float) -> bool:
-    """True if swings that grew in the last half of a run do so no more at its end, by more than `TREND`.
+    """True if swings that grew in the last half of a run differ by less than `TREND` in its last tenth.
 
-    Those that grew by as much as `BEATS` at one rate would do so by 4 % in the last tenth.
+    Growth by `BEATS` in half a run at a constant rate is 4 % in the last tenth.
     """
     half, late = (_sizes(*_extremes(events, name, share * end)) for share in (0.5, LAST))
     return len(late) > 2 and late[-1] > BEATS * half[0] and max(late) <= (1 + TREND) * min(late)
@@ -202,7 +202,7 @@ def _settled(events: Sequence[AnyEvent], name: str, end: float) -> bool:
 def oscillations(events: Sequence[AnyEvent], end: float) -> dict[str, str]:
     """Sentence of each contact that oscillates up to the `end` (s) of a run without slip events, by name.
 
-    Empty of those whose oscillation dies out, or is smaller than the digits that are told.
+    Contacts whose oscillation decays, or is below the printed digits, are left out.
     """
     time = format_quantity(end, "s", DIGITS)
     found = {name: GROWS[True] + ON.format(time=time, speeds=speeds(one))
@@ -219,12 +219,12 @@ def _trend(sizes: Sequence[float]) -> float:
 
 
 def oscillates(swings: Swings) -> str:
-    """Sentence on an oscillation that goes on."""
+    """Sentence on a steady oscillation."""
     return OSCILLATES.format(every=format_quantity(swings.period, "s", DIGITS), speeds=speeds(swings))
 
 
 def speeds(swings: Swings) -> str:
-    """Lowest and highest velocity of an oscillation in words, both in the unit of the highest."""
+    """Format lowest and highest velocity of an oscillation, both in the unit of the highest."""
     low = format_like(swings.low, swings.high, "m/s", DIGITS)
     return f"{low} and {format_quantity(swings.high, 'm/s', DIGITS)}"
 
@@ -235,7 +235,7 @@ def _seen(swings: Swings) -> bool:
 
 
 def _sizes(peaks: Sequence[AnyEvent], troughs: Sequence[AnyEvent]) -> list[float]:
-    """Velocities of peaks above those of the troughs (m/s)."""
+    """Velocities of peaks less those of the troughs (m/s), in order."""
     return [peak.velocity - trough.velocity for peak, trough in zip(peaks, troughs, strict=False)]
 
 
@@ -251,7 +251,7 @@ def _stuck(events: Sequence[AnyEvent], last: AnySlip) -> bool:
     return any(one.kind == "arrest" and last.begin - last.recurrence < one.time < last.begin for one in events)
 
 
-def _told(values: Sequence[float], unit: str, area: float | None = None) -> str:
-    """Value, or range of values that differ in the digits that are told."""
+def _format(values: Sequence[float], unit: str, area: float | None = None) -> str:
+    """Format values as one, or as a range if they differ in the printed digits."""
     low, high = (format_quantity(end(values), unit, DIGITS, area) for end in (min, max))
     return low if low == high else format_range(min(values), max(values), unit, area, DIGITS)

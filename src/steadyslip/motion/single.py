@@ -33,9 +33,9 @@ from steadyslip.motion.status import BLOWN_UP, LOST, UNRESOLVED, WORDS, ending_c
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import segment_of
 
-CLOSER = 0.1  # of rtol, by which a motion is run once more that a finer history of late signals changes
+CLOSER = 0.1  # factor on rtol for a third run, if the second with more variables of delayed signals differs
 OWN_STEPS = 500_000
-"""Most steps of a run that records them all: a point takes some hundred bytes, and order 8 records four per step."""
+"""Limit of steps of a run that records them: a point takes some hundred bytes, and order 8 records four per step."""
 
 
 @checked(until=DURATION, times=TIMES)
@@ -54,7 +54,7 @@ def simulate(
     branch: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> History:
-    """Integrate a rig's motion in time.
+    """Motion of a rig in time, under a protocol.
 
     Parameters
     ----------
@@ -78,20 +78,20 @@ def simulate(
     rtol : float, optional
         Error allowed per step, relative to the size of each variable or to its scale (1 for ln v).
     most_steps : int, optional
-        Most steps; by default 10 million, or half a million where the solver's own steps are recorded, which stay in
-        memory.
+        Limit of steps; by default 10 million, or half a million where the solver's own steps are recorded, which stay
+        in memory.
     arrest : float, optional
         Share of the drive velocity below which the block counts as arrested.
     branch : int, optional
-        Number of the steady sliding to start from where there are several.
+        Index of the steady sliding to start from, by rising normal stress, where a rig has several.
     progress : callable, optional
         Called with the time reached, s, while the run goes on.
 
     Returns
     -------
     History
-        Its `status` tells how the run ended. A run that cannot be continued, or that Ctrl-C stops (``interrupted``),
-        returns what was computed.
+        Its `status` is the reason for which the run ended. A run that cannot go on, or that Ctrl-C stops
+        (``interrupted``), has the motion up to its end.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def simulate(
     NoSteadySliding
         If there is no steady sliding to start from.
     NotAvailable
-        If the rig's motion is ill-posed, or a law cannot move as asked.
+        If the rig's motion is ill-posed, or its laws or drive exclude the run.
 
     Examples
     --------
@@ -130,11 +130,11 @@ def _simulated(
     rig: Slider | Machine, plan: Protocol, until: float | str | None, times: Any, initial: Mapping[str, Any] | None,
     events: bool, options: Options, branch: int, progress: Callable[[float], None] | None = None,
 ) -> tuple[History, int]:  # fmt: skip
-    """Run, and the number of variables of each late signal."""
+    """History of a run, and the number of variables of each delayed signal (0 without delays)."""
     jobs = prepare(rig, plan, until, {}, initial or {}, options, branch)
     events = events or jobs.late_order > 0
     if not jobs.exists[0]:
-        steady_state(rig)  # raises, and says why
+        steady_state(rig)  # raises NoSteadySliding with the reason
     if not jobs.posed[0]:
         raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed', rig)}")
     final = float(jobs.segments.end.max())
@@ -152,12 +152,12 @@ def _with_end(plan: Protocol, until: float) -> Protocol:
 
 
 def checked_times(times: Any, until: float) -> np.ndarray:
-    """Requested times as an array, checked.
+    """Requested times (n,), s, as an array; empty for None.
 
     Raises
     ------
     ParameterError
-        If they are not rising, or outside the run.
+        If times do not rise, or lie outside the run.
     """
     if times is None:
         return np.empty(0)
@@ -181,6 +181,7 @@ def _history(
     requested: np.ndarray,
     own: bool,
 ) -> History:
+    """History from the outcome of a run; `own` is True if the solver's steps were recorded."""
     status = WORDS[int(outcome.status[0])]
     steps, end = outcome.steps[0], float(outcome.final[0, Final.TIME])
     if own:
@@ -230,14 +231,14 @@ def _surfaces(point: OperatingPoint) -> tuple[float, ...]:
 
 @cached
 def areas(model: Model) -> ArrayFunction:
-    """Function for the areas of the contacts, m²; forces are stresses times areas."""
+    """Compiled function: areas of the contacts, m² (forces are stresses times areas) (cached)."""
     return model.function(contact.area for contact in model.contacts)
 
 
 def _velocities(
     outcome: Outcome, contacts: tuple[str, ...], found: dict[str, np.ndarray], events: tuple[AnyEvent, ...]
 ) -> tuple[float, float] | dict[str, tuple[float, float]]:
-    """Lowest and highest velocity of a run, from samples, events and the event statistics."""
+    """Lowest and highest velocity (m/s) of a run, by contact for a machine; from samples, events and statistics."""
     each: dict[str, tuple[float, float]] = {}
     for i, name in enumerate(contacts):
         first, samples = i * len(TALLY), found[f"{name}.slip_rate" if name else "v"]
@@ -250,7 +251,7 @@ def _velocities(
 
 
 def _last_event(kind: str, jobs: Jobs, machine: Runner, outcome: Outcome, surfaces: tuple[float, ...]) -> AnyEvent:
-    """Event for the end of a run that could not go on; of a machine at the contact that is lost, or fastest."""
+    """Event at the early end of a run; for a machine at the contact that is lost, or fastest in a blow-up."""
     zero, final = np.zeros(1, dtype=int), outcome.final[0]
     segment, time = final[[Final.SEGMENT]].astype(int), final[[Final.TIME]]
     found = observe(jobs, machine, 0, zero, segment, time, outcome.point, outcome.tables)

@@ -13,11 +13,11 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.weights import slip_rates
 
 UNRESOLVED = "delay not resolved"
-"""Status of runs with a delay that a finer late signal changes (`steadyslip.motion.late_check`)."""
+"""Status of runs with a delay that change if delayed signals have more variables (`steadyslip.motion.late_check`)."""
 WORDS = (*STATUSES, "interrupted", "no steady sliding", "ill-posed", "out of range", UNRESOLVED)
 NEEDS_MASS = "needs a mass: without it the block takes any velocity at once"
 THROUGH_DASHPOT = "acts through a dashpot (damping, of a link, a kd) as an infinite force"
-"""What is told of a blow without mass, and of a step of the load point; pages say both too."""
+"""Clauses on a blow without mass, and on a step of the load point, for messages and the browser page."""
 LOST, BLOWN_UP = "contact lost", "blow-up"
 
 CAUSES = {
@@ -29,7 +29,7 @@ CAUSES = {
     "no velocity": "no velocity that floating point can hold balances the forces",
     "no steady sliding": "there is no steady sliding to start from (lock-up or lift-off)",
 }
-"""Why a run ended early, by status; pages say the same."""
+"""Cause of an early end of a run, by status, for messages and the browser page."""
 
 REMEDIES = {
     "done": "",
@@ -56,19 +56,19 @@ REMEDIES = {
 
 
 def remedy(word: str, rig: Rig) -> str:
-    """Cause of a status and advice, in the words of the rig, with forces if it has an area; empty if done."""
+    """Cause of a status and advice, in the rig's terms, with forces if it has an area; empty for ``done``."""
     text = f"{CAUSES[word]}; {REMEDIES[word]}" if word in CAUSES else REMEDIES[word]
     return text.format(mass=rig.words["mass"], stress=stress_name(rig.result_name("stress"), rig.area))
 
 
 def causes(rig: Rig) -> dict[str, str]:
-    """Why a run of a rig ended early, by status, in the words of the rig."""
+    """Cause of an early end of a run, by status, in the rig's terms."""
     stress = stress_name(rig.result_name("stress"), rig.area)
     return {word: text.format(stress=stress) for word, text in CAUSES.items()}
 
 
 def ending_contact(point: OperatingPoint, status: str, stresses: Any, rates: Any) -> np.ndarray:
-    """Contact that is least pressed relative to steady sliding where contact is lost, the fastest in a blow-up.
+    """Index of the contact at which a run ended: least normal stress relative to steady sliding, or fastest slip.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def ending_contact(point: OperatingPoint, status: str, stresses: Any, rates: Any
     Returns
     -------
     ndarray of int (k,)
-        Index of the contact; −1 for other statuses, and for a block with one contact, which has no name.
+        Index of the contact that is lost, or fastest in a blow-up; −1 for other statuses, and for a slider.
     """
     count = np.broadcast_shapes((1,), *(np.shape(one) for one in stresses))
     if status not in (LOST, BLOWN_UP) or not point.model.contacts[0].name:

@@ -25,7 +25,7 @@ from steadyslip.motion.status import WORDS
 from steadyslip.motion.targets import targets
 
 RUN = FileKind("run", 3, 2**29, "simulate again and save the run anew")
-MOST_EVENTS = 10**6  # bound of memory: some 100 bytes each
+MOST_EVENTS = 10**6  # limit of events in a file, for memory: some 100 bytes each
 _EVENT_UNITS = {
     "time": "s", "velocity": "m/s", "normal_stress": "Pa", "shear_stress": "Pa", "spring_stress": "Pa", "slip": "m",
 }  # fmt: skip
@@ -106,7 +106,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     Raises
     ------
     NotAvailable
-        If the file is not one of ours, is damaged, or cannot be read.
+        If the file is not a saved history, is damaged, or cannot be read.
     """
     from steadyslip.files.specifications import protocol_from_text, rig_from_text
     from steadyslip.model.build import model_of
@@ -168,6 +168,7 @@ def _velocities(table: ExpectedTable, rig: Rig, found: dict[str, Any]) -> dict[s
 
 
 def _check_words(table: ExpectedTable) -> None:
+    """Check that attributes of a file have values that a history can have."""
     attributes = table.attributes
     known = {"status": WORDS, "method": tuple(METHODS)}
     for name, words in known.items():
@@ -190,7 +191,7 @@ def _check_samples(table: ExpectedTable, data: dict[str, np.ndarray]) -> None:
 
 
 def to_csv(history: HistoryData, path: str | PathLike[str]) -> None:
-    """Write the samples as comma-separated text, forces of the whole contact where the rig has an area.
+    """Write the samples as comma-separated text; stresses become forces if the rig has an area.
 
     Raises
     ------

@@ -22,10 +22,9 @@ class Targets:
     Attributes
     ----------
     pushes : tuple of str
-        Coordinates that are pushed (or the drive), in the order of their first pieces.
+        Coordinates (or the drive) on which forces act, in the order of their first pieces; "" for a slider's block.
     presses : tuple of str
-        Contacts that are pressed or injected into. Both tuples as for `steadyslip.model.reducing.reduce_model`: empty
-        for none, "" for the block of a slider.
+        Contacts whose normal stress or pore pressure is changed; "" for a slider's contact.
     channels : tuple of int
         Channel of each piece.
     """
@@ -36,15 +35,15 @@ class Targets:
 
     @property
     def drive(self) -> str:
-        """Motion of the drive in the run: moved, pulled by a force, or either in turns."""
+        """Kind of drive in the run: `MOVED`, `PULLED` by an imposed force, or `EITHER`, one after the other."""
         return EITHER if FREE in self.pushes else PULLED if LOAD_POINT in self.pushes else MOVED
 
     def named(self) -> dict[str, tuple[int, str, str]]:
         """Names in results of the forces and stresses that act, each with (channel, kind of target, target).
 
-        A single push is called ``disturbance``; of several, each has its target's name before it. Likewise
-        ``normal_disturbance`` and ``injection``. There is a push even if nothing is pushed. Where the drive is let go
-        for some time, ``creep`` is 1 meanwhile.
+        A single push is called ``disturbance``; if there are several, each has its target's name before it. Likewise
+        ``normal_disturbance`` and ``injection``. Without any push there is a ``disturbance`` of 0. If the drive is
+        released for some time, ``creep`` is 1 during it.
         """
         found = {}
         by_turns = self.drive == EITHER
@@ -66,7 +65,7 @@ class Targets:
 
 NOTHING = Targets()
 LET_GO = (LOAD_POINT, FREE, SWITCH)
-"""First push targets where the drive is let go and moves on."""
+"""First targets in `Targets.pushes` if the drive is released and moves again."""
 
 
 def targets(rig: Slider | Machine, plan: Protocol) -> Targets:
@@ -113,7 +112,7 @@ class _TargetSearch:
         return tuple(dict.fromkeys(name for piece, name in pairs if piece.channel == kind and name is not None))
 
     def _of(self, piece: Piece, where: str) -> str | None:
-        """Target of a piece; None for the motion of the load point, and after noting a problem."""
+        """Target of a piece; None for the motion of the load point, and if a problem was added to `problems`."""
         if isinstance(piece, OnDrive):
             return LOAD_POINT
         if isinstance(piece, OnBlock):

@@ -13,13 +13,13 @@ from steadyslip.core.errors import Problem
 from steadyslip.protocol.curves import Array, Curve, Jump, Wave, column
 
 LOADING, FREE, SWITCH = 1, 3, 4
-"""Disturbance channels of a run with a released drive: force of the drive (Pa, N or N m); 1 while it is released;
-and at segments where that changes, 1 to keep its present force, 2 to take the imposed one."""
-ROUNDING = 1e-12  # relative difference of two times that counts as zero: some thousand roundings of a sum of times
+"""Disturbance channels of a run with a released drive. `LOADING`: force of the drive (Pa, N or N m); `FREE`: 1 while
+it is released; `SWITCH`, where a release begins: 1 to keep the drive's present force, 2 to take the imposed one."""
+ROUNDING = 1e-12  # relative difference of two times that counts as zero: some thousand rounding errors of a sum
 
 
 class PieceLike(Protocol):
-    """Interface of `steadyslip.protocol.Piece` used here, which cannot be imported because it imports this module."""
+    """Interface of `steadyslip.protocol.Piece`, which cannot be imported here, as its module imports this one."""
 
     name: ClassVar[str]
     channel: ClassVar[int]
@@ -38,11 +38,11 @@ class Release:
     Attributes
     ----------
     begin, end : ndarray (lanes or 1, 1)
-        s.
+        Begin and end of the span, s.
     to : ndarray (lanes or 1, 1) or None
-        Force (Pa, or N, N m of a machine); None to keep the force at release.
+        Imposed force (Pa, for machines N or N m); None to keep the force at release.
     changes : tuple of Curve
-        Changes added to the force.
+        Changes that are added to the force.
     """
 
     begin: Array
@@ -112,6 +112,7 @@ def spans_of(pieces: Sequence[PieceLike], drive: Sequence[Curve]) -> tuple[list[
 
 
 def _spans(pieces: Sequence[PieceLike], drive: Sequence[Curve]) -> list[Release]:
+    """Spans in which the drive is released, in order of time, without changes of the force."""
     found, place = [], count()
     for piece in pieces:
         if piece.channel != 0 or piece.curve(0.0) is None:
@@ -125,8 +126,8 @@ def _spans(pieces: Sequence[PieceLike], drive: Sequence[Curve]) -> list[Release]
         if times.shape[1] > 1:
             own = times[:, 1:]  # at + duration may round to just beyond the start of the next piece
             end = np.where(np.abs(later - own) <= ROUNDING * np.abs(own), np.maximum(later, own), own)
-        told = getattr(piece, "to", None)
-        found.append(Release(times[:, :1], end, None if told is None else column(told)))
+        force = getattr(piece, "to", None)
+        found.append(Release(times[:, :1], end, None if force is None else column(force)))
     return found
 
 

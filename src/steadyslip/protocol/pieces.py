@@ -1,4 +1,4 @@
-"""Protocol pieces: what moves the load point, and stresses on block, contact, drive and pores.
+"""Protocol pieces: motions of the load point, and stresses on block, contact, drive and pores.
 
 Before the first piece that sets it, the velocity of the load point is that of the rig's drive.
 """
@@ -182,8 +182,8 @@ class SlideHoldSlide(Piece, name="slide-hold-slide"):
 class Creep(Piece, name="creep"):
     """The drive is let go for some time and pulls with a stress of its own, whatever the block does.
 
-    That is its pull at that moment, or what it is told, and as much more as steps, ramps and tables of creep say that
-    begin in this time. Then it goes on with its former velocity from where it carries the same stress.
+    The stress is that at release, or `to`, plus the steps, ramps and tables of creep that begin during the release.
+    Afterwards the drive goes on with its former velocity, from the position at which it carries this stress.
     """
 
     frees_load_point: ClassVar[bool] = True
@@ -222,8 +222,8 @@ class VelocityHarmonic(Harmonic, name="velocity-harmonic"):
 class LoadPointTable(Piece, name="load-point-table"):
     """A measured motion of the load point: the displacement is linear between samples.
 
-    So the velocity is constant between samples; displacements count from the first one. Before the first
-    sample the load point goes on with its former velocity, after the last one with that of the last interval.
+    Velocity is constant between samples; displacements count from the first one. Before the first sample the load
+    point goes on with its former velocity, after the last one with that of the last interval.
     """
 
     time: tuple[float, ...] = samples("s", "times of the samples, ascending")

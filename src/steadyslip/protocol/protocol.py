@@ -181,6 +181,7 @@ _NOTHING = Protocol()
 
 
 def _joined(first: Piece | Protocol, second: Piece | Protocol) -> Protocol:
+    """Protocol with the pieces of both arguments and the later end; NotImplemented for other types."""
     if not isinstance(second, (Piece, Protocol)):
         return NotImplemented
     one, two = Protocol.of(first), Protocol.of(second)

@@ -55,7 +55,7 @@ class Segments:
         return "linear" if np.any(self.slope) else "constant"
 
     def divisors(self) -> Array:
-        """Angular frequencies (rad/s), 1 where there is no wave, so that one may divide by them."""
+        """Angular frequencies (rad/s), and 1 where there is no wave, as divisors."""
         return np.where(self.amplitude == 0, 1.0, self.angular_frequency)
 
     def rows(self, start: int, stop: int) -> Array:
@@ -111,7 +111,7 @@ class _Terms:
 
 
 def pack(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, ...] | None = None) -> Segments:
-    """Cut a protocol into segments.
+    """Segments of a protocol: time spans on which every channel is a line plus sine waves.
 
     Parameters
     ----------

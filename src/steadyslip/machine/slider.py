@@ -41,6 +41,10 @@ class Slider(Rig, section="slider"):
     """Named bodies, as of a `Machine`; a slider's block has no name."""
     contacts: ClassVar[Mapping[str, Any]] = {}
     """Named contacts, as of a `Machine`; a slider's contact has no name."""
+    links: ClassVar[Mapping[str, Any]] = {}
+    """Named links, as of a `Machine`."""
+    fed: ClassVar[None] = None
+    """The body to whose motion drive.velocity refers, of a `Machine` only."""
 
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")

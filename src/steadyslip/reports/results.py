@@ -84,7 +84,7 @@ def rig_section(
     """
     if rig is None:
         return []
-    what = "The machine" if isinstance(rig, Machine) else "The rig"
+    what = "The machine" if rig.bodies else "The rig"
     return [heading(what), sketch_of(rig), rig_report.input_table(rig, tolerances, notes_of(source))]
 
 

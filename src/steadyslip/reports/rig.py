@@ -131,7 +131,7 @@ def input_table(
 def _fed_body(rig: Slider | Machine, name: str) -> str:
     """Clause on the body to which the printed drive speed refers, and on the speed in the equations; empty if equal."""
     in_si = Rig.display_value(rig, name, 1.0)
-    if not isinstance(rig, Machine) or name != "drive.velocity" or rig.display_value(name, 1.0) == in_si:
+    if rig.fed is None or name != "drive.velocity" or rig.display_value(name, 1.0) == in_si:
         return ""
     own = format_quantity(*Rig.display_value(rig, name, float(rig.drive.velocity)))
     return f", that of {rig.fed}; in the equations it is that of {rig.drive.driven() or 'the load point'}, {own}"

@@ -17,7 +17,6 @@ from steadyslip.files.specifications.contact_sizes import G
 from steadyslip.files.specifications.held_bodies import friction_at_rest, is_of_forces, mass_on
 from steadyslip.files.specifications.other_units import number_of
 from steadyslip.files.specifications.sizes import size_warnings
-from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.structures import StructureBody
 
@@ -125,14 +124,13 @@ def _doubts(rig: Rig, questioned: Collection[str]) -> Iterator[str]:
             continue  # a law's warnings compare these values
         for text in one.friction.doubts():
             found.setdefault(text, []).append(one.prefix)
-    if isinstance(rig, Machine):
-        yield from _structure_doubts(rig)
+    yield from _structure_doubts(rig)
     for text, (first, *others) in found.items():
         names = " and ".join(prefix.removesuffix(".") for prefix in (first, *others))
         yield f"{names}: {text}" if others else f"{first}{text}"
 
 
-def _structure_doubts(rig: Machine) -> Iterator[str]:
+def _structure_doubts(rig: Rig) -> Iterator[str]:
     """Warnings of structures, and of contacts at points that cannot move along or across the slide."""
     structures = {name: body for name, body in rig.bodies.items() if isinstance(body, StructureBody)}
     own_doubts = {name: list(body.doubts()) for name, body in structures.items()}
@@ -208,12 +206,7 @@ def _undamped(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 def _idle(rig: Rig) -> Iterator[str]:
     """Warning of a motor that turns so slowly that the speed behind its gear may be meant."""
-    if (
-        not isinstance(rig, Machine)
-        or not rig.drive.turns
-        or rig.fed is not None
-        or not 0 < rig.drive.velocity < SLOWEST_MOTOR
-    ):
+    if not rig.drive.turns or rig.fed is not None or not 0 < rig.drive.velocity < SLOWEST_MOTOR:
         return
     behind = {name: float(speed) for name, speed in rig.speeds().items() if rig.turns_on(name)}
     name = min(behind, key=lambda one: abs(behind[one]), default="")

@@ -24,7 +24,6 @@ from steadyslip.files.specifications.other_units import (
     times,
     written,
 )
-from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 
 G = 9.81  # m/s^2
@@ -94,7 +93,7 @@ def _bristles(rig: Rig, read: Read) -> Iterator[SizeWarning]:
 
 def _bends_well(rig: Rig, name: str, bend: float) -> bool:
     """True if a bend of bristles before slip (m) is within the plausible range."""
-    radius = rig.contacts[name.split(".")[1]].radius if isinstance(rig, Machine) else None
+    radius = rig.contacts[name.split(".")[1]].radius if rig.contacts else None
     return THIN <= bend <= (TURNED * radius if radius else THICK)
 
 
@@ -113,7 +112,7 @@ def _unchanged(rig: Rig, read: Read) -> Iterator[SizeWarning]:
         elif speed and scale > UNCHANGED * speed:
             text = f"{written(read, name)} is {times(scale / speed)} the speed of sliding, "
             text += f"{format_quantity(speed, 'm/s')}, at which friction is still that at rest: "
-            if not meant and not isinstance(rig, Machine):
+            if not meant and not rig.contacts:
                 slow = texts_in_units(read, "drive.velocity", "m/s", between(scale / UNCHANGED, 10 * scale))
                 meant = named("velocity", slow)
             yield name, text + hint(meant)
@@ -178,7 +177,7 @@ def _too_fast(rig: Rig, read: Read) -> Iterator[SizeWarning]:
 
 def _radii(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[SizeWarning]:
     """Warnings of contact radii far outside the turning body; 1 m stands for an unknown radius."""
-    for name, surface in rig.contacts.items() if isinstance(rig, Machine) else ():
+    for name, surface in rig.contacts.items():
         body, radius, key = bodies.get(surface.held), surface.radius, f"contacts.{name}.radius"
         if body is None or not radius or not body.inertia or radius == 1.0 or key not in read:
             continue
@@ -192,7 +191,7 @@ def _slip_speed(rig: Rig, prefix: str) -> float:
     """Speed (m/s) of steady sliding at a contact; 0 if the drive holds a position or it is not known."""
     if rig.holds:
         return 0.0
-    if not isinstance(rig, Machine):
+    if not rig.contacts:
         return abs(float(rig.drive.velocity))
     surface = rig.contacts[prefix.split(".")[1]]
     return abs(float(rig.speeds().get(surface.held, 0.0))) * (surface.radius or 1.0)

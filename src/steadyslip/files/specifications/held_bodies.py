@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from steadyslip.core.format import format_quantity
-from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 
 YOUNG, SHEAR, DENSITY = 2.1e11, 8e10, 7850.0  # Pa, Pa, kg/m^3, of steel
@@ -90,7 +89,7 @@ class HoldingSpring(NamedTuple):
 
 def bodies_of(rig: Rig) -> dict[str, HeldBody]:
     """Bodies of a rig by name, without springs and structures; a slider has one, ``slider``."""
-    if not isinstance(rig, Machine):
+    if not rig.bodies:
         pull = friction_at_rest(rig, "friction.any") * (rig.load_of("friction.any") or 0.0)
         mass = (rig.value("slider.mass") or 0.0) * (rig.area or 1.0)
         return {"slider": HeldBody("the slider", False, mass, pull, 0.0, abs(float(rig.drive.velocity)), {})}
@@ -111,7 +110,7 @@ def bodies_of(rig: Rig) -> dict[str, HeldBody]:
 def springs_of(rig: Rig, bodies: Mapping[str, HeldBody]) -> dict[str, HoldingSpring]:
     """Springs along the motion by the name of their stiffness; also enters them in `bodies[...].springs`."""
     found = {}
-    for name, link in rig.links.items() if isinstance(rig, Machine) else ():
+    for name, link in rig.links.items():
         ends = [FIXED_END if end not in rig.bodies else bodies.get(end) for end in link.between]
         if link.rigidity() is not None and "x" in link.directions() and not any("." in end for end in link.between):
             first, second = (end for end in ends if end is not None)
@@ -127,13 +126,13 @@ def springs_of(rig: Rig, bodies: Mapping[str, HeldBody]) -> dict[str, HoldingSpr
 
 def mass_at(rig: Rig, name: str) -> str:
     """Name of the mass of the body that slides at the contact to which the parameter `name` belongs."""
-    return f"bodies.{rig.contacts[name.split('.')[1]].body}.mass" if isinstance(rig, Machine) else "slider.mass"
+    return f"bodies.{rig.contacts[name.split('.')[1]].body}.mass" if rig.contacts else "slider.mass"
 
 
 def mass_on(rig: Rig, name: str) -> float:
     """Mass (kg) of the body that slides at the contact to which the parameter `name` belongs; 0 if not known."""
     address = rig.parameters().get(mass_at(rig, name))
-    return (address.value or 0.0) * (1.0 if isinstance(rig, Machine) else rig.area or 0.0) if address else 0.0
+    return (address.value or 0.0) * (1.0 if rig.in_forces else rig.area or 0.0) if address else 0.0
 
 
 def is_of_forces(rig: Rig, name: str) -> bool:

@@ -24,7 +24,6 @@ from steadyslip.files.specifications.other_units import (
     times,
     written,
 )
-from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 
 SLOWEST = 0.05  # Hz, lowest plausible natural frequency: long drill strings have 0.2 Hz, base isolation 0.3 Hz
@@ -83,7 +82,7 @@ def _stiff(rig: Rig, springs: Mapping[str, HoldingSpring], read: Read) -> Iterat
             made = "cylinder of steel as thick as long, of the inertia" if body.turns else "cube of steel of the mass"
             text = f"{written(read, name)} is {times(stiffness / body.block)} the stiffness of a {made} of "
             meant = hint(_springs_meant(read, name, spring))
-            rigid = ', or stiffness = "rigid"' if isinstance(rig, Machine) and "is " not in meant else ""
+            rigid = ', or stiffness = "rigid"' if rig.links and "is " not in meant else ""
             yield name, f"{text}{body.name}, {body.text}: {meant}{rigid}"
 
 
@@ -153,8 +152,8 @@ def _springs_meant(read: Read, name: str, spring: HoldingSpring) -> list[str]:
 
 def _geared_up(rig: Rig, bodies: Mapping[str, HeldBody]) -> Iterator[SizeWarning]:
     """Warning of a body that turns much faster than its motor, though it has more inertia."""
-    motor = bodies.get(rig.drive.driven() or "") if isinstance(rig, Machine) else None
-    if motor is None or not motor.turns or not isinstance(rig, Machine):
+    motor = bodies.get(rig.drive.driven() or "") if rig.links else None
+    if motor is None or not motor.turns:
         return
     for name, link in rig.links.items():
         (first, second), ratio = link.between, float(link.ratio())
@@ -189,14 +188,14 @@ def _damped(rig: Rig, read: Read, springs: Mapping[str, HoldingSpring]) -> Itera
         name, stiffness, (body, at_body) = f"{key.rpartition('.')[0]}.damping", spring.stiffness, spring.heavier
         if name not in read or not 0 < body.inertia < math.inf:
             continue
-        damping = (rig.value(name) or 0.0) * (1.0 if isinstance(rig, Machine) else rig.area or 1.0)
+        damping = (rig.value(name) or 0.0) * (rig.area or 1.0)
         inertia = body.inertia * stiffness / at_body  # referred to the end at which the stiffness is given
         critical = 2 * math.sqrt(inertia * stiffness)
         if damping > OVERDAMPED * critical:
             si, of = ("N m/rad", "N m s/rad") if body.turns else ("N/m", "N s/m")
             least = (damping / (2 * DAMPED)) ** 2  # least stiffness times inertia for a plausible damping ratio
             meant = named(key, texts_in_units(read, key, si, between(least / inertia, body.block / STEEL)))
-            if not isinstance(rig, Machine):
+            if not rig.bodies:
                 heaviest = (rig.load_of("friction.any") or math.inf) / (G * LIGHT)
                 masses = texts_in_units(read, "slider.mass", "kg", between(least / stiffness, heaviest))
                 meant += named("mass", masses)
@@ -209,7 +208,7 @@ def _damped(rig: Rig, read: Read, springs: Mapping[str, HoldingSpring]) -> Itera
 def _controlled(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[SizeWarning]:
     """Warnings of an implausible position gain, and of a sample time or delay too long for it."""
     known, name = rig.parameters(), "drive.kp"
-    body = bodies.get((rig.drive.driven() or "") if isinstance(rig, Machine) else "slider")
+    body = bodies.get((rig.drive.driven() or "") if rig.bodies else "slider")
     gain = (known[name].value or 0.0) * (rig.area or 1.0) if name in known else 0.0
     if body is None or not gain or not body.inertia or read.get(name, (None, ""))[1] not in ("N/m", "N m/rad", "Pa/m"):
         return
@@ -252,7 +251,7 @@ def _overdamped_gain(rig: Rig, read: Read, body: HeldBody, gain: float) -> Itera
 
 def _massless(rig: Rig, read: Read) -> Iterator[SizeWarning]:
     """Warning of a missing mass, for a slider with a Stribeck curve."""
-    if isinstance(rig, Machine) or "slider.mass" in read:
+    if rig.bodies or "slider.mass" in read:
         return
     if any(one.role.kind == "exponent" for one in rig.parameters().values()):
         text = "slider.mass is not given, so nothing swings; write the mass, or mass = 0 if it is left out on purpose"

@@ -96,7 +96,7 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
             key, default = selector(section.family)
             word = _law_name(record, section.name)
             first = [] if word == default else [f'{key} = "{word}"']
-        own = rig.parameters() if isinstance(rig, Machine) and section.name == "drive" else {}
+        own = rig.parameters() if rig.bodies and section.name == "drive" else {}
         blocks.append(table_text(f"[{section.name}]", record, first, section.name, area, own))
     if protocol is not None:
         blocks.append(

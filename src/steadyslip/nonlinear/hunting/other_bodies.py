@@ -9,6 +9,7 @@ import numpy as np
 
 from steadyslip.core.pages import Displayed
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.hunting.plant import Array, Plant
 
@@ -31,16 +32,16 @@ class BodySwing(Displayed):
     unit: str
 
 
-def reported_body(rig: Slider | Machine) -> str:
+def reported_body(rig: Rig) -> str:
     """Body whose position `Hunt` reports: that whose feed is given, or the drive's; empty for a rig with one body."""
-    if not isinstance(rig, Machine) or len(rig.bodies) < 2:
+    if len(rig.bodies) < 2:
         return ""
     return rig.fed or rig.drive.driven() or ""
 
 
-def measured_body(rig: Slider | Machine) -> str:
+def measured_body(rig: Rig) -> str:
     """Body of a machine whose position the controller measures; empty for a rig with one body."""
-    return rig.drive.watched()[0] if reported_body(rig) and isinstance(rig, Machine) else ""
+    return rig.drive.watched()[0] if reported_body(rig) else ""
 
 
 def other_bodies(rig: Slider | Machine) -> dict[str, float]:

@@ -50,13 +50,13 @@ def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Pro
 
 def refuse_jump(rig: Slider | Machine) -> None:
     """Raise NotAvailable if a step of the load point would need an infinite force (dashpot), or moves nothing."""
-    if isinstance(rig, Machine) and not any(LOAD_POINT in e.senses for e in rig.mechanism().elements):
+    if rig.bodies and not any(LOAD_POINT in e.senses for e in rig.mechanism().elements):
         raise NotAvailable(
             "a displacement step of the drive moves nothing where no link is between the drive and a body, only the "
             "surface beneath one; kick a body instead, with at='NAME' (--at NAME; --kick 'displacement at NAME' of "
             "analyze), or by another kick"
         )
-    if isinstance(rig, Machine) and any(e.damping and LOAD_POINT in e.senses for e in rig.mechanism().elements):
+    if rig.bodies and any(e.damping and LOAD_POINT in e.senses for e in rig.mechanism().elements):
         raise NotAvailable(
             f"a displacement step of the drive {THROUGH_DASHPOT}; kick a body instead, with at='NAME' (--at NAME; "
             "--kick 'displacement at NAME' of analyze), or by another kick"

@@ -105,7 +105,7 @@ def test_a_map_that_is_not_finished_says_what_finishes_it(tmp_path, capsys, monk
         (("map", "none.zarr"), "there is no map 'none.zarr'"),
         (("map", "none.toml", "-o", "a.zarr"), "no such file"),
         (("map", SAFE, "-o", "a.zarr", "--refine", "1", "--show", "status"), "--show: is for figures of a map"),
-        (("map", SAFE, "-o", "a.zarr", "--level", "3"), "--level: is about the edge to refine"),
+        (("map", SAFE, "-o", "a.zarr", "--level", "3"), "--level: applies to a refined edge only"),
         (("map", SAFE, "-o", "a.zarr", "--cluster", "tcp://:"), "allowed: 'local', or an address"),
         (("sensitivity", SAFE, "--points", "100"), "a power of 2"),
         (("sensitivity", SAFE, "--of", "status"), "not one number"),

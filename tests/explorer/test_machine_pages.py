@@ -122,7 +122,7 @@ def test_machines_drawn_at_random_move_on_pages_as_in_python(seed):
 
 def test_a_delay_is_refused_in_words():
     late = two_mass().with_values({"drive.delay": 0.01})
-    with pytest.raises(ss.NotAvailable, match="delay is none; steadyslip analyze"):
+    with pytest.raises(ss.NotAvailable, match="delay does not have; use steadyslip analyze"):
         linear_part(late)
 
 

@@ -274,7 +274,7 @@ def test_what_a_chart_cannot_show_is_said(x, y, options, message):
 def test_unknown_names_and_missing_scales_are_said():
     with pytest.raises(ss.UnknownNameError, match=r"contact\.angle"):
         figures.stability_chart(paper_rig(), "contact.angel", "stiffness")
-    with pytest.raises(ss.NotAvailable, match="give its range"):
+    with pytest.raises(ss.NotAvailable, match="no default range; give one"):
         figures.stability_chart(STRENGTHENING, "slider.mass", "stiffness")
 
 

@@ -139,7 +139,7 @@ def test_the_rig_is_marked_in_its_own_panel_only(maps):
 def test_kinds_have_colours_and_names(maps):
     ax = maps["chart"].plot(show="onset")
     assert labels(ax)[:3] == ["none", "supercritical", "subcritical"]
-    with pytest.raises(ss.ParameterError, match="several numbers a point"):
+    with pytest.raises(ss.ParameterError, match="several numbers per point"):
         maps["chart"].plot(show="stable_stiffness")
 
 

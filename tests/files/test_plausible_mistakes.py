@@ -248,11 +248,11 @@ UNITLESS = {
 @pytest.mark.parametrize(
     ("text", "wrong", "answer"),
     [
-        (HUNTING, 'control = "pid"\n', "drive.control: missing; kp, .* of control = 'pid': write it"),
+        (HUNTING, 'control = "pid"\n', "drive.control: missing; kp, .* keys of control = 'pid': write that"),
         (
             MACHINE,
             'control = "rotary-p-pi"\n',
-            "drive.control: missing; body, .* are of control = 'rotary-p-pi': write it",
+            "drive.control: missing; body, .* are keys of control = 'rotary-p-pi': write that",
         ),
     ],
     ids=["slider", "machine"],

@@ -64,7 +64,7 @@ def test_a_misspelt_word_for_a_structure_is_one_problem(tmp_path, wrong):
     with pytest.raises(ss.RigFileError, match=re.escape("structure'")) as raised:
         ss.read_rig(written(tmp_path, TEXT.replace(WORD, wrong)))
     (problem,) = raised.value.problems
-    assert "did you mean 'structure'? allowed: slide" in str(problem) or "write it" in str(problem)
+    assert "did you mean 'structure'? allowed: slide" in str(problem) or "write that" in str(problem)
 
 
 def test_the_former_name_of_the_key_is_read(tmp_path):

@@ -369,7 +369,7 @@ def test_a_held_axis_has_a_report_on_its_hunting():
     assert "Canudas de Wit" in text
     assert "[protocol]" not in text or "[protocol]" in path.read_text()
     assert len(found.encode()) <= 500_000
-    with pytest.raises(ss.NotAvailable, match="knows no branch, fit, tolerances or charts"):
+    with pytest.raises(ss.NotAvailable, match="leave out branch, fit, tolerances and charts"):
         ss.report(ss.read_rig(path), branch=1)
 
 

@@ -264,7 +264,7 @@ def test_one_file_that_is_held_is_refused_once(tmp_path):
     path.write_text(
         (Path(__file__).parents[2] / "examples/hunting-axis.toml").read_text(encoding="utf-8"), encoding="utf-8"
     )
-    with pytest.raises(ss.ParameterError, match=r"drive\.velocity is 0, and verdicts") as raised:
+    with pytest.raises(ss.ParameterError, match=r"drive\.velocity is 0, but verdicts") as raised:
         compare_files(path, path)
     assert len(raised.value.problems) == 1
 

@@ -324,7 +324,7 @@ def test_rigs_that_contradict_themselves_are_not_drawn():
         ("stiffness=12..14 N/um (normal)", "a range has no standard deviation"),
         ("stiffness=12 ± 2 s", "has the wrong dimension|12 s"),
         ("area=200 ± 1 % cm^2", "slider.area: takes no part in the equations"),
-        ("tolerances.stiffness=5 %", "tolerances.stiffness: is given beside the value as well; write it once"),
+        ("tolerances.stiffness=5 %", "tolerances.stiffness: is given with the value as well; write it once"),
         ("tolerances.mass=12", "tolerances.mass: got 12; allowed: text such as '20 %'"),
         ("tolerances.mass=heavy", "'heavy' is no tolerance; write for example '20 %'"),
         ("tolerances.mas=5 %", "unknown parameter 'mas'; did you mean 'slider.mass'"),

@@ -47,13 +47,13 @@ def print_formula(result: Any, along: str | None) -> None:
     try:
         with progress_text("simplifying the formula"):
             parts = formula_in_parts(result.rig, along)
-        told = [
+        lines = [
             fill(
                 f"{one.lhs} = {one.rhs}", _WIDTH, initial_indent="  ", subsequent_indent="    ", break_long_words=False
             )
             for one in parts
         ]
-        print_text("\n".join(["", f"Edge in {along}" if along else "Critical stiffness", *told]))
+        print_text("\n".join(["", f"Edge in {along}" if along else "Critical stiffness", *lines]))
     except NotAvailable as reason:
         print_text(f"\nNo formula: {reason}")
 

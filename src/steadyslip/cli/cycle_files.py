@@ -53,13 +53,13 @@ def cycles_of_file(
     if own:
         say(own)
     along = along or rig.default_along or _nearest_oscillation(rig)
-    with progress_text("following cycles; Ctrl-C keeps what there is") as said:
+    with progress_text("following cycles; Ctrl-C keeps what there is") as show:
 
         def progress(count: int, cycle: Cycle) -> None:
-            said(f"{count} cycles, period {format_quantity(cycle.period, 's')}; Ctrl-C keeps what there is")
+            show(f"{count} cycles, period {format_quantity(cycle.period, 's')}; Ctrl-C keeps what there is")
 
         found = cycles(rig, along, between=between, doublings=doublings, progress=progress)
-        said("the cycle at the rig itself")
+        show("the cycle at the rig itself")
         found.at_rig  # noqa: B018  (computed here and cached, for printing and writing)
         return found
 
@@ -70,7 +70,7 @@ def _nearest_oscillation(machine: Slider | Machine) -> str:
     built = [one for one in found if one.parameter.startswith(("links.", "drive."))]
     nearest = oscillatory_edge(built) or oscillatory_edge(found)
     if nearest is None:
-        raise NotAvailable("no parameter has an edge in its range at which oscillations begin; name one, --along NAME")
+        raise NotAvailable("no parameter has an oscillatory edge in its range; name a parameter with --along NAME")
     return nearest.parameter
 
 
@@ -129,10 +129,10 @@ def hunt_of_file(
         If the file or an argument is invalid; lists all problems.
     """
     rig, protocol = read_experiment(path, changes, pieces, until, ends=False)
-    with progress_text("hunting") as said:
+    with progress_text("hunting") as show:
 
         def progress(time: float, strokes: int) -> None:
-            said(f"hunting, {strokes} strokes by {format_quantity(time, 's')}")
+            show(f"hunting, {strokes} strokes by {format_quantity(time, 's')}")
 
         return hunt(rig, protocol, rtol=rtol, progress=progress)
 

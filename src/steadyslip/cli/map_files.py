@@ -47,10 +47,10 @@ def map_file(
             raise ParameterError([Problem(str(source), message)])
         return open_map(source)
     if len(stores) != 1:
-        came = f"got {len(stores)} names for the map" if stores else f"got {outputs[0].name}" if outputs else "missing"
+        found = f"got {len(stores)} names for the map" if stores else f"got {outputs[0].name}" if outputs else "missing"
         name = (outputs[0] if outputs else source).with_suffix(STORE).name
         wanted = f"also give one for the map itself, such as -o {name}" if outputs and not stores else ""
-        message = f"{came}; {wanted or f'give one name for the map, such as -o {name}'}"
+        message = f"{found}; {wanted or f'give one name for the map, such as -o {name}'}"
         raise ParameterError([Problem("output", message)])
     check_path(stores[0])
     return run_map(read_map(source, changes), stores[0], workers=workers, cluster=cluster)
@@ -63,7 +63,7 @@ def _check_words(refine: bool, figure: Mapping[str, Any], edge: Mapping[str, Any
         message = "is for figures of a map; with --refine they show the edge. Draw the map itself in a second command"
     else:
         idle = [name for name, value in edge.items() if value is not None]
-        message = "is about the edge to refine; add --refine N"
+        message = "applies to a refined edge only; add --refine N"
     if idle:
         raise ParameterError([Problem(f"--{name}", message) for name in idle])
 

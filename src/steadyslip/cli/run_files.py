@@ -98,8 +98,8 @@ def read_experiment(
 def progress_of(protocol: Protocol) -> Iterator[Callable[[float], None]]:
     """Context that shows the progress of a run on a terminal; yields a function to call with the time reached (s)."""
     end = format_quantity(protocol.until or np.nan, "s")
-    with progress_text("simulating") as said:
-        yield lambda time: said(f"simulating, at {format_quantity(time, 's')} of {end}; Ctrl-C keeps what there is")
+    with progress_text("simulating") as show:
+        yield lambda time: show(f"simulating, at {format_quantity(time, 's')} of {end}; Ctrl-C keeps what there is")
 
 
 def _pieces(texts: Iterable[str], rig: Slider | Machine) -> list[Piece]:

@@ -235,7 +235,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
 _NO_RIG = {"unknown": ("No such rig", ": numbers outside what a rig can have")}
 """Headline for values that can be entered on a page but are not allowed in a rig."""
 _UNFIT = "a number leaves its range, or breaks a condition that several obey together"
-_TOLD_BESIDES = frozenset({"m", "m/s", "s", "Hz", "1/s", "rad/s", "Pa", "N", "N m", "Pa/m", "N/m", "N m/rad"})
+_RESULT_UNITS = frozenset({"m", "m/s", "s", "Hz", "1/s", "rad/s", "Pa", "N", "N m", "Pa/m", "N/m", "N m/rad"})
 """SI units of the results on a page: motion, times, rates, stresses, forces, stiffnesses."""
 
 
@@ -244,8 +244,8 @@ def _written_units(rig: Slider | Machine) -> dict[str, list[tuple[str, float]]]:
 
     Units of friction per load are left out: they are used for single parameters only.
     """
-    told = {outside(one.role.unit, rig.area_of(name))[1] for name, one in rig.parameters().items()}
-    units = {si: units_for(si, display_names()) for si in sorted(told | _TOLD_BESIDES) if si != "1"}
+    used = {outside(one.role.unit, rig.area_of(name))[1] for name, one in rig.parameters().items()}
+    units = {si: units_for(si, display_names()) for si in sorted(used | _RESULT_UNITS) if si != "1"}
     return {
         si: [(name, unit(name)[0]) for name in names]
         for si, names in units.items()

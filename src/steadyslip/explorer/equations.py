@@ -66,13 +66,13 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
     model = page_model(rig)
     if model.carried is not None or not is_written_out(model):
         raise NotAvailable(
-            "a page has its equations written out, and those of this machine, whose bodies hold each other in so many "
-            "ways, would be too long for one; steadyslip analyze, simulate and report take it"
+            "a page has its equations written out, and those of this machine, whose bodies are coupled in many ways, "
+            "are too long for that; use steadyslip analyze, simulate or report"
         )
     if model.delays:
         raise NotAvailable(
-            "the page judges by a polynomial, and the characteristic equation of a rig with delay is none; "
-            "steadyslip analyze and boundary take it, and stable_values in Python"
+            "a page needs a characteristic polynomial, which a rig with a delay does not have; use steadyslip analyze, "
+            "or ss.boundary and ss.stable_values in Python"
         )
     coefficients = characteristic_coefficients(model)
     names, observables = _shown_observables(model)

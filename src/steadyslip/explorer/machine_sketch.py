@@ -149,5 +149,5 @@ class SvgPencil(Pencil):
         angle, long = math.degrees(math.atan2(y2 - y1, x2 - x1)), math.hypot(x2 - x1, y2 - y1)
         path = "".join(part.split(' d="')[1].split('"')[0] for part in inner.parts)
         place = f"translate({x1:.4g} {y1:.4g}) rotate({angle:.4g}) scale({long / UNIT:.4g} 1)"
-        told = f'data-ends="{x1:.4g} {y1:.4g} {x2:.4g} {y2:.4g}" data-bodies="{html.escape(" ".join(ends))}"'
-        self.parts.append(f'<g class="link" {told} transform="{place}"><path d="{path}" {_THIN}/></g>')
+        marks = f'data-ends="{x1:.4g} {y1:.4g} {x2:.4g} {y2:.4g}" data-bodies="{html.escape(" ".join(ends))}"'
+        self.parts.append(f'<g class="link" {marks} transform="{place}"><path d="{path}" {_THIN}/></g>')

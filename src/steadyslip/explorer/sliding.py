@@ -35,16 +35,16 @@ def steady_programs(model: Model) -> list[Program]:
     joint = joint_equation(model)
     if joint is not None:
         return [_joint_program(model, joint)]
-    sought = needs_search(model)
+    searched = needs_search(model)
     formulas = [
         one
-        for place, look in enumerate(sought)
+        for place, look in enumerate(searched)
         for one in ([0] * VALUES_PER_CONTACT if look else _formula(model, place))
     ]
     residuals = [
         program(model, f"residual{place}", [contact.steady_stress - contact.sigma_ss])
         for place, contact in enumerate(model.contacts)
-        if sought[place]
+        if searched[place]
     ]
     return [program(model, "steady", formulas), *residuals]
 

@@ -105,7 +105,7 @@ def _default_range(rig: Slider, name: str, role: Parameter, value: float) -> tup
     if value and not 1 / _MAX_EDGE_RATIO < abs(nearest / value) < _MAX_EDGE_RATIO:
         nearest = value
     if nearest == value == 0:
-        raise NotAvailable(f"{name} is zero and has no edge of stability, which leaves no scale; give its range")
+        raise NotAvailable(f"{name} is zero and has no edge of stability, so it has no default range; give one")
     if domain.low < 0:
         ends = (value, nearest, 0.0)
         margin = 0.5 * (max(ends) - min(ends))

@@ -48,7 +48,7 @@ def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:
     >>> axes.figure.savefig("machine-sketch.svg")
     """
     if any(body.is_structure for body in machine.bodies.values()):
-        raise NotAvailable("a structure has the shape of its matrices, which no sketch shows; draw its modes instead")
+        raise NotAvailable("a structure given by matrices has no shape to sketch; draw its modes instead")
     pencil = AxesPencil(axes_or_new(ax))
     Drawing(machine, pencil).draw()
     own = pencil.ax

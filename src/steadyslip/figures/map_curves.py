@@ -116,7 +116,7 @@ def draw_scatter(ax: Axes, found: MapResult, view: View, show: str | None) -> No
         name = name or found.results[0]
         values = np.asarray(view.values[name], dtype=float)
         if values.ndim > 1:
-            raise ParameterError([Problem("show", f"{name!r} has several numbers a point; choose another result")])
+            raise ParameterError([Problem("show", f"{name!r} has several numbers per point; choose another result")])
         up = Scale(name, found.unit(name), values, spaced=False, area=found.area(name))
         across.append(up(np.where(np.isfinite(values), values, np.nan)))
         ax.set_yscale("log" if up.log else "linear")

@@ -45,7 +45,7 @@ def refined(found: Refined, ax: Axes | None = None) -> Axes:
     """
     names = [name for name in found.map.dims if name in found.spacing]
     if len(names) != 2:
-        message = f"is over {', '.join(names)}; an edge is drawn over two grids. Write it as .csv instead"
+        message = f"is over {', '.join(names)}; edges are drawn over two grids only: write this one as .csv"
         raise ParameterError([Problem(str(found.map.path), message)])
     ax = axes_or_new(ax)
     places = tuple(np.asarray(found.map.dataset[name].values) for name in names)
@@ -62,7 +62,7 @@ def refined(found: Refined, ax: Axes | None = None) -> Axes:
         groups = [(values == code, words[code], KIND_COLOURS[code % len(KIND_COLOURS)]) for code in np.unique(values)]
     else:
         if found.level is None:
-            raise InternalError(f"the refined edge of {found.of}, which is a number, has no level")
+            raise InternalError(f"a level for the refined edge of {found.of}, a number")
         above = values > found.level
         groups = [(above, f"above {found.level:.4g}", BLUE), (~above, f"below {found.level:.4g}", ORANGE)]
     for chosen, label, colour in groups:

@@ -291,7 +291,7 @@ def _levels(values: Array) -> list[float]:
 def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: str, scale: Any) -> None:
     values = view.values[name]
     if values.ndim > 2:
-        message = f"{name!r} has several numbers a point; draw it over one parameter, y=''"
+        message = f"{name!r} has several numbers per point; draw it over one parameter, y=''"
         raise ParameterError([Problem("show", message)])
     words = found.words(name)
     if words:

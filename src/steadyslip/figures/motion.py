@@ -120,10 +120,10 @@ def _constant_load(run: History) -> str:
     if not all(len(one) and np.ptp(one) <= _ROUNDING * np.max(np.abs(one)) for one in many.values()):
         return ""
     unit, area = ("N", None) if rig.contacts else ("Pa", rig.area)
-    told = [typeset(format_quantity(float(one[0]), unit, area=area)) for one in many.values()]
+    texts = [typeset(format_quantity(float(one[0]), unit, area=area)) for one in many.values()]
     if len(many) > 1:
-        told = [f"{value} at {name}" for value, name in zip(told, many, strict=True)]
-    return f"constant {stress_name(rig.result_name('normal stress'), rig.area)}: {', '.join(told)}"
+        texts = [f"{value} at {name}" for value, name in zip(texts, many, strict=True)]
+    return f"constant {stress_name(rig.result_name('normal stress'), rig.area)}: {', '.join(texts)}"
 
 
 def _limit_zoom(ax: Axes, *shown: np.ndarray) -> None:
@@ -269,9 +269,9 @@ def _draw_steady_states(run: History, rig: Slider, ax: Axes, x: np.ndarray, fact
             stress.append(np.nan)
     pressed = any(piece.channel == NORMAL_STRESS for piece in Protocol.of(run.protocol).pieces)
     label = "steady states before the change of normal stress" if pressed else "steady states"
-    told = np.array(stress) / factor
-    told[(told < beside[0]) | (told > beside[1])] = np.nan
-    ax.plot(steps, told, color=BLACK, linewidth=1, label=label)
+    drawn = np.array(stress) / factor
+    drawn[(drawn < beside[0]) | (drawn > beside[1])] = np.nan
+    ax.plot(steps, drawn, color=BLACK, linewidth=1, label=label)
     last = float(run["load_velocity"][-1])
     if not pressed and last > 0:
         with suppress(NoSteadySliding):

@@ -166,9 +166,9 @@ def save_with_footer(axes: Any, path: str, result: Any) -> None:
     """Save the figure of Axes with embedded fonts and a footer: file, values not on an axis, version and date."""
     figure = np.atleast_1d(np.asarray(axes, dtype=object)).flat[0].figure
     width, height = figure.get_size_inches()
-    file, told = _footer(result, figure.axes)
+    file, about = _footer(result, figure.axes)
     most = int(width * 72 / (0.55 * _FOOTER))  # letters per line: each 0.55 of its size wide
-    words = fill(f"{file}{told}", most, break_long_words=False, break_on_hyphens=False)
+    words = fill(f"{file}{about}", most, break_long_words=False, break_on_hyphens=False)
     text = _plain(file) + with_subscripts(words[len(file) :])  # a_b in a file's name is no subscript
     extra = (1 + text.count("\n")) * 1.3 * _FOOTER / 72 + 0.06  # inches
     figure.set_size_inches(width, height + extra)
@@ -277,18 +277,18 @@ def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
         held = ", ".join(_values_of(rig, [one for one in rig.parameters() if one not in {*fitted, *shown, *changed}]))
         first = ", ".join(_values_of(rig, changed))
         done = protocol_words(rig, protocol) if isinstance(protocol, Protocol) else ""
-        told = ", ".join(
+        about = ", ".join(
             _unbroken(f"{estimate_words(rig, name)} {typeset(one.shown())}") for name, one in estimates.items()
         )
         laws = [one.friction for one in rig.laws_by_contact().values()] if fitted else []
         words = dict.fromkeys(f"{law.name} friction{_kind(law)}" for law in laws)
         file = rig.read_from or getattr(getattr(result, "path", None), "name", "")  # maps have a path
-        parts = [*words, f"fitted: {told}" if told else "", f"held: {held}" if held else ""]
+        parts = [*words, f"fitted: {about}" if about else "", f"held: {held}" if held else ""]
         done = _OF_UNIT.sub("\xa0", typeset(done))
         parts += [f"at first: {first}" if first else "", f"protocol: {done}" if done else ""]
     parts.append(f"steadyslip\xa0{version()}, {datetime.now(UTC):%Y-%m-%d}")
-    told = ". ".join(one for one in parts if one)
-    return (file.replace(" ", "\xa0"), f". {told}") if file else ("", told)
+    about = ". ".join(one for one in parts if one)
+    return (file.replace(" ", "\xa0"), f". {about}") if file else ("", about)
 
 
 def _values_of(rig: Rig, names: Iterable[str]) -> Iterator[str]:

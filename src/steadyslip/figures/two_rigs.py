@@ -120,10 +120,10 @@ def _heights(found: RigComparison, rigs: list[Any], name: str, x: Array) -> _Hei
     growth = [np.where(np.isinf(one), np.nan, one) for one in growth]  # an ill-posed rig has no finite rate
     if found.measure == "safety":
         safety = [np.asarray(safety_factor(rig, {name: x}), dtype=float) for rig in rigs]
-        told = [
+        agrees = [
             ((one > 1) == (rate < 0)) | (one == 1) | np.isnan(rate) for one, rate in zip(safety, growth, strict=True)
         ]
-        if np.all(told) and all(np.isfinite(one).any() for one in safety):
+        if np.all(agrees) and all(np.isfinite(one).any() for one in safety):
             return _Heights(safety, f"{SAFETY_WORDS} (1)", 1.0, True)
     return _Heights(growth, "growth rate of disturbances (1/s)", 0.0, False)
 

@@ -83,7 +83,7 @@ def call(module: str, function: str, arguments: Sequence[Any], seconds: float) -
             head, arrays = _exchange(reader, {**job, "folder": _folder()})
         except (OSError, EOFError, ValueError) as error:
             out_of_time = late.is_set() or _code(reader) == -getattr(signal, "SIGXCPU", 0)
-            why = f"it takes more than {seconds:.0f} s" if out_of_time else "it breaks what reads it; it is damaged"
+            why = f"it takes more than {seconds:.0f} s" if out_of_time else "it crashes its reader; it is damaged"
             raise Ended(why) from error
         finally:
             clock.cancel()

@@ -58,7 +58,7 @@ def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, priv
     """
     name = str(path)
     if "\0" in name:
-        raise UnreadableFile(name, "a name of a file has no null character")
+        raise UnreadableFile(name, "file names cannot contain a null character")
     try:
         descriptor = os.open(path, _FLAGS | (0 if links else getattr(os, "O_NOFOLLOW", 0)))
     except OSError as error:
@@ -113,7 +113,7 @@ def inside(root: Path, key: str) -> Path:
         if part in ("", ".", "..") or "\0" in part:
             raise UnreadableFile(str(path), "no file has this name")
         if path.is_symlink():
-            raise UnreadableFile(str(path), "it is a link, which may lead anywhere; remove it")
+            raise UnreadableFile(str(path), "it is a symbolic link, which may lead anywhere; remove it")
     return path
 
 

@@ -62,8 +62,8 @@ def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any, parts: 
     """
     check_output([Path(path)], [".nc"])
     if (size := sum(one.nbytes for one in (dataset, *parts))) > kind.most:
-        told = f"it has {size / 2**20:.0f} MiB, more than the {kind.most // 2**20} MiB that a {kind.name}"
-        raise NotAvailable(f"cannot write {str(path)!r}: {told} may have; keep fewer samples")
+        too_large = f"it has {size / 2**20:.0f} MiB, more than the {kind.most // 2**20} MiB that a {kind.name}"
+        raise NotAvailable(f"cannot write {str(path)!r}: {too_large} may have; keep fewer samples")
     kept = _whole(dataset)
     for i, part in enumerate(map(_whole, parts), start=1):
         part = part.rename({name: f"part{i}.{name}" for name in {*part.variables, *part.sizes}})
@@ -158,7 +158,7 @@ class ExpectedTable:
         except (TypeError, ValueError, RecursionError) as error:
             raise self.fault("an attribute is missing or not JSON") from error
         if not fits_form(found, form):
-            raise self.fault(f"an attribute holds {found!r:.60}, which has another form")
+            raise self.fault(f"an attribute is {found!r:.60}, which is not of the expected form")
         return found
 
     def columns(self, expected: Mapping[str, ColumnRule]) -> dict[str, Any]:

@@ -77,7 +77,7 @@ def unseal(raw: bytes, path: str | PathLike[str], kind: FileKind, of: str = "") 
         )
     content = memoryview(raw)
     if hashlib.sha256(content[: len(raw) - _DIGEST]).hexdigest().encode() != found[4]:
-        raise refusal("it is damaged, its content is not what was written")
+        raise refusal("it is damaged: its content has changed since it was written")
     if found[1] != kind.name.encode():
         raise refusal(f"it holds a {found[1].decode()} and is not a steadyslip {kind.name}")
     if int(found[2]) != kind.version:

@@ -183,7 +183,7 @@ def _level(found: MapResult, of: str, level: float | None) -> float | None:
     if of not in found.results:
         problems.append(Problem("of", unknown_name("result", of, found.results)))
     elif found.store.array(of).ndim > len(found.dims):
-        problems.append(Problem("of", f"{of!r} has several numbers a point; choose another result"))
+        problems.append(Problem("of", f"{of!r} has several numbers per point; choose another result"))
     elif found.words(of):
         if level is not None:
             problems.append(Problem("level", f"{of} is one of several kinds; leave the level away"))

@@ -88,7 +88,7 @@ def _cures(result: Hunt) -> Iterator[str]:
     """HTML of the changes that were tried, the best first, with the distance from the target that each leaves."""
     unit, own, limits = result.unit, _reach(result), result.rig.drive.limits()
     asked = limits.dead_band if limits else None
-    allowed = own if asked is None else float(asked) * _told_over_measured(result)
+    allowed = own if asked is None else float(asked) * _result_over_measured(result)
     until = LONGER * float(result.time[-1])
     found = [Tried(what, hunt(rig, result.protocol, until=until), least) for what, rig, least in _changed(result)]
     found.sort(key=lambda one: (one.verdict(allowed) != "ends it", one.reach))
@@ -96,9 +96,9 @@ def _cures(result: Hunt) -> Iterator[str]:
     limit = f"{format_quantity(allowed, unit)} ({bound})"
     good = [one for one in found if one.verdict(allowed) == "ends it"]
     if good:
-        told = f"Make this change: {good[0].what}. The axis then rests, "
-        told += f"within {format_quantity(good[0].reach, unit)} of the target" if good[0].reach else _ON_TARGET
-        yield paragraph(f"{told}; {WHY}.")
+        text = f"Make this change: {good[0].what}. The axis then rests, "
+        text += f"within {format_quantity(good[0].reach, unit)} of the target" if good[0].reach else _ON_TARGET
+        yield paragraph(f"{text}; {WHY}.")
     else:
         yield paragraph(f"None of the changes below lets it rest within {limit} of the target; {WHY}.")
     rows = [
@@ -116,7 +116,7 @@ def _cures(result: Hunt) -> Iterator[str]:
     yield table(rows, ("change", "then", "off the target by up to", "worth"), caption=words)
 
 
-def _told_over_measured(result: Hunt) -> float:
+def _result_over_measured(result: Hunt) -> float:
     """Ratio of the motion of the body that results refer to to the motion of the body that the controller measures."""
     return result.rig.feed()[0] / result.rig.seen()[0]
 
@@ -147,7 +147,7 @@ def _changed(result: Hunt) -> Iterator[tuple[str, Any, float]]:
     band = BAND * _reach(result)
     with suppress(ParameterError, NotAvailable, TypeError):  # a drive without these keys
         words = f"a dead band of {format_quantity(band, result.unit)} of the integral ({BAND:g} amplitudes)"
-        measured = band / _told_over_measured(result)
+        measured = band / _result_over_measured(result)
         yield words, replace(rig, drive=replace(rig.drive, dead_band=measured, dead_band_of="integral")), band
     gains = {name: STIFFER * one.value for name, one in known.items() if _is_gain(rig, name) and one.value}
     if gains:

@@ -101,8 +101,8 @@ def _details(fit: Fit | MachineFit, rig: Rig) -> str:
 
 def _lead(fit: Fit | MachineFit, rig: Rig) -> str:
     """Sentence with the parameters that are determined, and their values."""
-    told = ", ".join(f"{estimate_words(rig, one.name)} {one.shown()}" for one in fit.estimates if one.determined)
-    return f"{told[:1].upper()}{told[1:]}." if told else "No parameter is determined."
+    values = ", ".join(f"{estimate_words(rig, one.name)} {one.shown()}" for one in fit.estimates if one.determined)
+    return f"{values[:1].upper()}{values[1:]}." if values else "No parameter is determined."
 
 
 @parts_of.register
@@ -192,8 +192,8 @@ def _population(result: Population) -> Parts:
         mean, other, words = result.mean(name), result.another(name), estimate_words(rig, name)
         rows.append((words, mean.shown(), mean.range(), other.range()))
         for label, alone in result.alone(name).items():
-            said = "not determined alone" if alone is None else alone.shown()
-            own.append((words, label, said, result.experiment(label, name).shown()))
+            alone_text = "not determined alone" if alone is None else alone.shown()
+            own.append((words, label, alone_text, result.experiment(label, name).shown()))
     body = [
         heading("What was found"), table(
             rows,

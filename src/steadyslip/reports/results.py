@@ -199,7 +199,7 @@ def _machine(
     if result.holds:
         return _of_held(result, source, fit is not None or branch or tolerances or charts)
     if branch or fit is not None:
-        raise NotAvailable("a machine has one steady sliding, and fits are of a slider; leave branch and fit out")
+        raise NotAvailable("a machine has one steady state, and fits are for sliders; leave branch and fit out")
     within = tolerate(result, tolerances) if tolerances else None
     order = Order(charts, getattr(tolerances, "adjust", {}), source, getattr(tolerances, "unknown", {}))
     return machine_report.verdict_parts(analyze(result), within, order)
@@ -209,8 +209,8 @@ def _of_held(rig: Slider | Machine, source: str, asked: Any) -> Parts:
     """Contents (`Parts`) of the document of a rig whose drive holds a position: whether it hunts."""
     if asked:
         raise NotAvailable(
-            "the drive holds a place (velocity = 0), so the document is on whether it hunts, which knows no branch, "
-            "fit, tolerances or charts; leave them out"
+            "the drive holds a position (velocity = 0), so the document is on whether the axis hunts; leave out "
+            "branch, fit, tolerances and charts, which have no effect on that"
         )
     return replace(_hunt(hunt(rig), source), protocol=None)  # list the rig's own file, without the disturbance tried
 
@@ -311,8 +311,8 @@ def _history(result: History) -> Parts:
         f"What does this rig do in {format_quantity(result.protocol.until or result.end, 's')} "
         "under the protocol below?"
     )
-    told = " ".join(sentence(words) for words in (result.message, result.sentence) if words)
-    return Parts(head, told, question, body, rig, result.protocol)
+    lead = " ".join(sentence(words) for words in (result.message, result.sentence) if words)
+    return Parts(head, lead, question, body, rig, result.protocol)
 
 
 def _load_name(rig: Slider | Machine) -> str:

@@ -177,8 +177,8 @@ def chart_pairs(analysis: Analysis, order: Order) -> list[tuple[str, str]]:
 
     Two pairs for a slider, each with the stiffness; one for a machine, of the cheapest changes; none with matrices.
     """
-    told = [*changeable(analysis, order.adjustable), *(one for one in analysis.margins if one.edge is not None)]
-    names = list(dict.fromkeys(one.parameter for one in told))
+    ordered = [*changeable(analysis, order.adjustable), *(one for one in analysis.margins if one.edge is not None)]
+    names = list(dict.fromkeys(one.parameter for one in ordered))
     if not analysis.rig.in_forces:
         stiffness = analysis.rig.stiffness_name()
         return [(name, stiffness) for name in names if name != stiffness][:2]
@@ -230,9 +230,9 @@ def motion_equations(rig: Slider | Machine, printed: Sequence[sp.Eq] = ()) -> It
         return
     model = build_model(rig)
     equations = model.equations()
-    told = [one for one in equations if _is_used(one, equations)]
+    shown = [one for one in equations if _is_used(one, equations)]
     yield paragraph("The equations of motion:")
-    for equation in told:
+    for equation in shown:
         yield equation_html(equation)
     if axial := list(_along_axis(rig, model)):
         yield paragraph("The stiffness along the sliding direction, of that along the axis:")
@@ -240,7 +240,7 @@ def motion_equations(rig: Slider | Machine, printed: Sequence[sp.Eq] = ()) -> It
     if states := list(states_of_laws(model)):
         yield paragraph("The state of friction in the descriptions of its laws, which are named below:")
         yield from map(equation_html, states)
-    yield letters(rig, [*printed, *told, *axial, *states])
+    yield letters(rig, [*printed, *shown, *axial, *states])
 
 
 def _along_axis(rig: Slider | Machine, model: Model) -> Iterator[sp.Eq]:

@@ -122,7 +122,7 @@ def motion(analysis: Analysis, title: str = "The motion", source: str = "") -> I
     kick = f"the drive runs {100 * (STEP - 1):.0f} % faster from {begin} to {end}"
     yield paragraph(
         f"A small disturbance shows what the verdict means: {kick}, and at its own speed again from then on. The "
-        f"{'machine' if rig.in_forces else 'rig'} itself is not changed. What follows: {_told(run, analysis)}."
+        f"{'machine' if rig.in_forces else 'rig'} itself is not changed. What follows: {_outcome(run, analysis)}."
     )
     if "protocol" in tomllib.loads(source):
         yield paragraph(
@@ -195,7 +195,7 @@ def _by_eigenvalues(analysis: Analysis) -> str:
     )
 
 
-def _told(run: History, analysis: Analysis) -> str:
+def _outcome(run: History, analysis: Analysis) -> str:
     """Clause on a motion: slip events and early end, or else its final deviation from steady sliding.
 
     The message of an early end is given without its advice: the document has a recommendation.
@@ -277,9 +277,9 @@ def references(*rigs: Slider | Machine, names: Sequence[str] = ()) -> Iterator[s
             whose = rows.setdefault(of, [])
             whose += [] if name in whose else [name]
     columns = ("part", "law", "what it is", "of")[: 4 if names else 3]
-    told = [(*of, with_subscripts(words), " and ".join(whose)) for (*of, words), whose in rows.items()]
+    table_rows = [(*of, with_subscripts(words), " and ".join(whose)) for (*of, words), whose in rows.items()]
     yield table(
-        (row[: len(columns)] for row in told),
+        (row[: len(columns)] for row in table_rows),
         columns,
         caption="Laws that were used.",
     )

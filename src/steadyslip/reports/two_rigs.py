@@ -28,12 +28,12 @@ def _comparison(result: RigComparison) -> Parts:
     )
     a, b = result.names
     (label, *names), *sides = result.side_by_side()
-    told = [tuple(_with_words(rigs, cells)) for cells in sides]
+    compared = [tuple(_with_words(rigs, cells)) for cells in sides]
     body = [
         *(part for name, one, within in of_each
           for part in recommendation(one, _order(within), within, f"The recommendation for {name}")),
         *_assumed(result),
-        heading("Side by side"), table(told, (label or "of", *names), caption="The two rigs."),
+        heading("Side by side"), table(compared, (label or "of", *names), caption="The two rigs."),
         heading("What differs?"), *_differences(result), _chart(result),
         *(part for name, one, within in of_each
           for part in (heading(f"How far is the edge of {name}?"), *edge_table(one),
@@ -87,7 +87,7 @@ def _differences(result: RigComparison) -> Iterator[str]:
         lost = [one.parameter for one in result.differences if IMPOSSIBLE in (one.first_with, one.second_with)]
         such = f", as with the {' or '.join(label_of(rig, name) for name in lost)} of the other alone" if lost else ""
         yield paragraph(
-            f"How much each difference contributes is not told: that needs all mixtures of {a} and {b}, and some "
+            f"How much each difference contributes is not given: that needs all mixtures of {a} and {b}, and some "
             f"cannot be built or do not slide steadily{such}. The last two columns tell what each does alone."
         )
     part = [f"its part in {result.of}"] if known else []

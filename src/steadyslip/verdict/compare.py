@@ -120,7 +120,7 @@ class RigComparison(Displayed):
         yield (
             f"What differs, by its part in the change of {self.of} (Shapley value){over}"
             if self.of
-            else ("What differs; no parts are told, since some rig between the two has no growth rate")
+            else ("What differs; no parts are given, since some mixture of the two has no growth rate")
         )
         for one, value in zip(self.differences, values, strict=True):
             text = f"{one.parameter:<{wide}}{value:<{across}}{self.part_in_words(one)}"
@@ -290,8 +290,8 @@ def compare_files(
 def _check_slides(rigs: Iterable[Slider | Machine], names: Iterable[str]) -> None:
     """Raise ParameterError that names the rigs whose drive holds a position (velocity 0)."""
     message = (
-        "drive.velocity is 0, and verdicts on sliding are compared; give it a speed, such as '1 mm/min', and leave out "
-        "what is of a held place alone, or ask `steadyslip hunt`, ss.hunt(rig) in Python, of either rig"
+        "drive.velocity is 0, but verdicts on sliding are compared; give it a speed, such as '1 mm/min', without keys "
+        "for holding a position, or use `steadyslip hunt`, ss.hunt(rig) in Python, for each rig"
     )
     held = dict.fromkeys(name for rig, name in zip(rigs, names, strict=True) if rig.holds)  # each file once
     problems = [Problem(name, message) for name in held]

@@ -240,7 +240,7 @@ def cure(
     own = adjust or (tolerances.adjust if isinstance(tolerances, Tolerances) else {}) or default_adjust(rig)
     given = {rig.resolve(name): one for name, one in own.items()}
     if not given:
-        raise ParameterError([Problem("adjust", "the rig has nothing that a designer chooses; name what may change")])
+        raise ParameterError([Problem("adjust", "no parameter of this rig may change by default; name at least one")])
     chance, error = chances.whole({})
     windows = tuple(_windows(chances, name, one, wanted) for name, one in given.items())
     pair: dict[str, float] = {}

@@ -91,9 +91,9 @@ def _imbalance(point: MachinePoint) -> float:
     for i, site in enumerate(matrices.sites):
         law = point.machine.contacts[site.name].friction
         sigma, tau = float(found.sigma[i]), float(found.tau[i])
-        told = float(law.steady_strength(sp.Float(site.velocity), sp.Float(sigma)))
-        worst = max(worst, abs(told - tau) / max(abs(tau), sigma * BALANCE_TOLERANCE))
-        terms += [-site.area * site.slip * told, site.area * site.apart * sigma]
+        strength = float(law.steady_strength(sp.Float(site.velocity), sp.Float(sigma)))
+        worst = max(worst, abs(strength - tau) / max(abs(tau), sigma * BALANCE_TOLERANCE))
+        terms += [-site.area * site.slip * strength, site.area * site.apart * sigma]
     table = np.array(terms)
     size = np.sum(np.abs(matrices.stiffness) @ np.abs(found.displacement)) + np.max(np.abs(table))
     return max(worst, float(np.max(np.abs(np.sum(table, axis=0)), initial=0.0) / size))

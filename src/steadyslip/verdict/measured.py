@@ -16,11 +16,11 @@ from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
 from steadyslip.verdict.numbers import rates_of
 
-_TOLD = 1e-4  # relative width of an edge's bracket (or of a growth rate) above which it is reported
+_REPORTED = 1e-4  # relative width of an edge's bracket (or of a growth rate) above which it is reported
 _EDGES = 3  # nearest edges that are computed from the identified modes as well
 _SURE = 4.0  # standard errors within which two computations agree
 _UNLIKE = (
-    " (more than errors away from the turns: modes near the ends of the band are not told apart from those beyond)"
+    " (more than errors away from the turns: modes near the ends of the band cannot be distinguished from those beyond)"
 )
 _COUNTED = {0: "no root grows", 1: "a root grows without oscillating", 2: "a pair of roots grows"}
 
@@ -50,12 +50,12 @@ def response_facts(machine: Machine, margins: Sequence[Margin]) -> list[tuple[st
         "det(I + R G) round 0. That the structure is stable with open contacts is taken for granted",
     )]  # fmt: skip
     root, error = found.root() if growing == 2 else (None, 0.0)
-    if root is not None and error > _TOLD * root.real:
+    if root is not None and error > _REPORTED * root.real:
         rows += [("its growth rate", f"{format_growth(root.real)} ± {format_growth(error)}")]
     rows += [("its modes", _by_modes(machine, margins))]
     if not np.any(own.deviation):
-        return [*rows, ("its errors", "not told, neither by coherence nor by repeats: taken as none")]
-    wide = [one.edge for one in margins if one.edge and np.ptp(one.edge.bracket) > _TOLD * abs(one.edge.value)]
+        return [*rows, ("its errors", "not given, neither by coherence nor by repeats: taken as none")]
+    wide = [one.edge for one in margins if one.edge and np.ptp(one.edge.bracket) > _REPORTED * abs(one.edge.value)]
     text = "; ".join(
         f"{edge.parameter} "
         + " to ".join(
@@ -91,6 +91,6 @@ def _by_modes(machine: Machine, margins: Sequence[Margin]) -> str:
             continue
         place, spread = (format_quantity(x, edge.unit, area=area) for x in (near.value, near.error))
         apart = max(edge.bracket[0] - near.value, near.value - edge.bracket[1])
-        unlike = apart > _SURE * near.error + _TOLD * abs(near.value)
+        unlike = apart > _SURE * near.error + _REPORTED * abs(near.value)
         text += [f"edge of {edge.parameter} at {place} ± {spread}" + (_UNLIKE if unlike else "")]
     return "; ".join(text)

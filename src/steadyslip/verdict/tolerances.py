@@ -30,7 +30,7 @@ from steadyslip.verdict.words import format_parameter, format_parameter_range
 # Sizes of samples, chosen by trial: computing time against the error of shares and the resolution of ranges (1/64).
 LOG2_CLOSED, LOG2_OTHERS, LOG2_LATE = 12, 8, 4  # log2 of rigs per group: with closed form, others, with a delay
 VALUES_ALONE = 65  # values of a parameter that is varied alone, both ends included
-VALUES_SOUGHT = 17  # values tried of each parameter in turn in `_otherwise`
+VALUES_SEARCHED = 17  # values tried of each parameter in turn in `_otherwise`
 REACHES = (1.0, 0.1, 0.01, 0.001)  # fractions of the range searched in successive rounds of `_otherwise`
 BINS = 32  # bins of equally many rigs: variance between them is attributed to the parameter
 LEAST = 0.01  # share of the variance below which a parameter is not worth naming
@@ -352,8 +352,8 @@ def _otherwise(
             for name, one in spreads.of.items():
                 if one.normal:
                     continue
-                line = {key: np.full(VALUES_SOUGHT, value) for key, value in here.items()}
-                near = here[name] + reach * (one.high - one.low) * np.linspace(-1, 1, VALUES_SOUGHT)
+                line = {key: np.full(VALUES_SEARCHED, value) for key, value in here.items()}
+                near = here[name] + reach * (one.high - one.low) * np.linspace(-1, 1, VALUES_SEARCHED)
                 line[name] = np.clip(near, one.low, one.high)
                 other, score = judged(line)
                 if np.any(other):

@@ -226,7 +226,7 @@ def disturbance(analysis: Findings) -> str:
     elif analysis.time_to_halve is not None:
         text = PACE["decays"].format(time=format_quantity(analysis.time_to_halve, "s"))
     else:  # only the sign of the leading root is above rounding
-        return f"{'dies away' if analysis.stable else 'grows'} too slowly for a rate to be told from rounding"
+        return f"{'dies away' if analysis.stable else 'grows'} too slowly for a rate to be distinguished from rounding"
     if not analysis.eigenvalues:
         return f"{text} at the slowest, infinitely many oscillations nearly alike"
     leading = analysis.eigenvalues[0]

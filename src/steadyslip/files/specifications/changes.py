@@ -109,7 +109,7 @@ def named_value(text: str) -> tuple[str, Any]:
     """
     name, equals, raw = split(text)
     if not equals or not name or not raw:
-        raise ParameterError([Problem(repr_short(text), "is none; write NAME=VALUE, such as contact.angle='10 deg'")])
+        raise ParameterError([Problem(repr_short(text), "is not NAME=VALUE, such as contact.angle='10 deg'")])
     return name, value_of(raw, name)
 
 

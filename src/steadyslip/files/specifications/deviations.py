@@ -87,8 +87,8 @@ def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[flo
             share = f"{width.partition(' ')[0]} %"
             hint = "" if width.endswith("%") else f"; for a share of the value write '± {share}'"
             with display_units(units_in([width])):
-                told = format_quantity(*rig.display_value(name, end), area=rig.printed_area(name))
-            wide = f"a tolerance of {width!r} is too wide: it reaches {told}; allowed: {one.role.domain.text}{hint}"
+                reached = format_quantity(*rig.display_value(name, end), area=rig.printed_area(name))
+            wide = f"a tolerance of {width!r} is too wide: it reaches {reached}; allowed: {one.role.domain.text}{hint}"
             raise ParameterError([Problem("", wide)]) from error
     return low, high
 

@@ -52,7 +52,7 @@ UNKNOWN_SCHEMA = {
     "description": "intervals of parameters that are not known, by dotted name: two numbers, or texts with units",
 }
 
-TOLD_IN = "# told in: "
+UNITS_LINE = "# told in: "
 """Beginning of the first line of a stored rig, before the units in which the rig and its results are printed."""
 MAP = "map"
 READ_ELSEWHERE = {MAP: "computes maps"} | dict.fromkeys(("record", "fit", "population"), "fits records")

@@ -26,7 +26,7 @@ from steadyslip.files.specifications.deviations import taken_out, wrong_ends
 from steadyslip.files.specifications.layout import (
     PROTOCOL,
     READ_ELSEWHERE,
-    TOLD_IN,
+    UNITS_LINE,
     Section,
     machine_sections,
     sections,
@@ -232,8 +232,8 @@ def read_contents(
         raise _failed(source, f"is not TOML: {error}") from error
     found = read_tables(tables, key_lines(text), source, changes, further, complete, rig_needed)
     first, _, rest = text.partition("\n")
-    if found.rig is not None and rest and first.startswith(TOLD_IN):
-        names = [one.split(" = ") for one in first.removeprefix(TOLD_IN).split("; ") if one]
+    if found.rig is not None and rest and first.startswith(UNITS_LINE):
+        names = [one.split(" = ") for one in first.removeprefix(UNITS_LINE).split("; ") if one]
         found.rig.set_display_units(sorted(units_in([f"1 {own}" for own, *of in names if not of])))
         own = {name: f"1 {one[0]}" for name, *one in names if one}
         known = found.rig.parameters()
@@ -270,7 +270,7 @@ def read_tables(
     rig = None if not rig_needed and set(tables) == {PROTOCOL.name} else reader.rig(names)
     protocol = reader.protocol(rig)
     found = {section.name: reader.settings(section) for section in further}
-    said = {name: one for name, one in found.items() if one is not None}
+    valid = {name: one for name, one in found.items() if one is not None}
     if rig is not None:
         rig.set_display_units(sorted(result_units(tables))).named(Path(source).name if source.endswith(".toml") else "")
         rig.set_parameter_units(units_named({name: raw for name, (raw, _) in reader.values_read.items()}))
@@ -279,7 +279,7 @@ def read_tables(
             warn_of_values(rig, reader.values_read, units_in(tables))
     wrong = {one.name for one in faults}  # reported once, as problems of tolerances
     problems = [*faults, *(one for one in reader.problems if one.name not in wrong)]
-    return RigFileContents(source, rig, protocol, said, problems, changed, lines, tables, tolerances)
+    return RigFileContents(source, rig, protocol, valid, problems, changed, lines, tables, tolerances)
 
 
 def _not_empty(text: str, source: str) -> str:

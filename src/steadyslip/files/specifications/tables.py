@@ -84,9 +84,9 @@ class TableReader:
         words = " or ".join(f"{key} = {name!r}" for name in known)
         self.problem(
             prefix + key,
-            f"missing; {enumerated(foreign)} are of {words}: write one"
+            f"missing; {enumerated(foreign)} are keys of {words}: write one"
             if known[1:]
-            else f"missing; {enumerated(foreign)} are of {words}: write it",
+            else f"missing; {enumerated(foreign)} are keys of {words}: write that",
         )
         return known[0]
 
@@ -210,12 +210,12 @@ class TableReader:
             another = _key_of_another(law, name, value)
             elsewhere = "" if another else _tables_with(name, self.sections)
             meanings = {key_of(item): role.doc for item, role in own_fields(law)}
-            told = unknown_name("key", name, keys, guess=not another, meanings=meanings, taken=table)
+            message = unknown_name("key", name, keys, guess=not another, meanings=meanings, taken=table)
             if elsewhere:
-                told = f"unknown key {repr_short(name)} here; it is a key of {elsewhere}"
-            self.problem(prefix + legible(name), told + another)
+                message = f"unknown key {repr_short(name)} here; it is a key of {elsewhere}"
+            self.problem(prefix + legible(name), message + another)
             for item, role in own_fields(law):
-                if f"did you mean {key_of(item)!r}?" in told and item.name not in arguments:
+                if f"did you mean {key_of(item)!r}?" in message and item.name not in arguments:
                     missing.pop(key_of(item), None)  # misspelt, so not missing
                     if (meant := self._value(role, value, prefix + name)) is not None:
                         arguments[item.name] = meant

@@ -132,7 +132,7 @@ class _Reader:
             if not (name := self._name(path, f"tolerances.{path}")):
                 continue
             if name in found:
-                self._problem(f"tolerances.{path}", "is given beside the value as well; write it once")
+                self._problem(f"tolerances.{path}", "is given with the value as well; write it once")
             elif not isinstance(raw, str):
                 self._problem(f"tolerances.{path}", f"got {repr_short(raw)}; allowed: text such as '20 %'")
             else:

@@ -72,11 +72,11 @@ def _explained(why: str, text: str) -> str:
     if place is None or not 0 < int(place[1]) <= len(lines):
         return why
     line = lines[int(place[1]) - 1]
-    told = next((told for slip, told in _SLIPS if slip.match(line)), "")
+    advice = next((advice for slip, advice in _SLIPS if slip.match(line)), "")
     if twice := _TWICE.match(why):
         name = ".".join(part.strip(" '\"") for part in twice[1].split(","))
-        told = f"the table [{name}] is there before; write its keys in one place"
-    return f"{why}: {line.strip()[:60]!r}" + (f"; {told}" if told else "")
+        advice = f"the table [{name}] is there before; write its keys in one place"
+    return f"{why}: {line.strip()[:60]!r}" + (f"; {advice}" if advice else "")
 
 
 def _check(tables: Any) -> None:

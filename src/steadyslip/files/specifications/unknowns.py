@@ -73,13 +73,13 @@ def intervals_of(
                 raise ParameterError([Problem("", f"got {repr_short(pair)}; allowed: the smaller value first")])
             found[full] = (low, high)
         except SteadyslipError as error:
-            said = error.problems[0].message if isinstance(error, ParameterError) else str(error)
+            message = error.problems[0].message if isinstance(error, ParameterError) else str(error)
             where = f"{UNKNOWN}.{name}"
-            problems.append(Problem(where, said, line_of(where, lines)))
+            problems.append(Problem(where, message, line_of(where, lines)))
     if problems:
         raise RigFileError(problems, title=str(path))
-    told = set()
+    changed = set()
     for name, _ in map(named_value, changes):
         with suppress(SteadyslipError):  # a change of another table
-            told.add(rig.resolve(name))
-    return {name: ends for name, ends in found.items() if name not in told}
+            changed.add(rig.resolve(name))
+    return {name: ends for name, ends in found.items() if name not in changed}

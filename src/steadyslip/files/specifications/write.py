@@ -14,7 +14,7 @@ from steadyslip.core.roles import Entry
 from steadyslip.files.output import write_text
 from steadyslip.files.specifications.layout import (
     PROTOCOL,
-    TOLD_IN,
+    UNITS_LINE,
     has_choice,
     machine_sections,
     own_fields,
@@ -108,7 +108,7 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
 def stored_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
     """Text of `rig_to_text` for stored results, with a first line on the units in which the rig is printed."""
     units = "; ".join([*sorted(rig.written_in), *(f"{name} = {one}" for name, one in rig.units_named.items())])
-    return f"{TOLD_IN}{units}\n{rig_to_text(rig, protocol)}"
+    return f"{UNITS_LINE}{units}\n{rig_to_text(rig, protocol)}"
 
 
 def _law_name(record: FrozenRecord, where: str) -> str:

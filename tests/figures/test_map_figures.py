@@ -238,6 +238,6 @@ def test_the_text_of_a_map_without_status_says_where_to_look(tmp_path):
     over = {"friction.b": ss.maps.Grid(0.010, 0.03, 9)}
     bare = ss.run_map(ss.Map(rig(), over, ["critical_stiffness"]), tmp_path / "bare.zarr", workers=1)
     told = ss.run_map(ss.Map(rig(), over, ["critical_stiffness", "status"]), tmp_path / "told.zarr", workers=1)
-    hint = "compute status as well to know of the rest"
+    hint = "compute status as well to see why the others have none"
     assert hint in str(bare)
     assert hint not in str(told)

@@ -35,7 +35,7 @@ def test_each_fault_is_named_where_it_stands():
     assert "unknown friction law []" in _spoiled("two-guides", ('law = "rate-state"', "law = []"))
     assert "links.'a\\nb': is not a valid name" in _spoiled("two-guides", ("links.belt", 'links."a\\nb"'))
     told = _spoiled("brake-pad", ('body = "pad"', 'body = "pad"\nloaded_by = "lining"'))
-    assert told.endswith("'lining' pulls away from the surface only; allowed: one along the slide")
+    assert told.endswith("'lining' pulls only away from the surface; allowed: a link along the slide")
     told = _spoiled("geared-servo", ('kd = "0.5 N s/mm"', 'tn = "1 s"'))
     assert "unknown key 'tn'; allowed: velocity, velocity_of, derivative," in told
     assert "body, measured, delay, kp, kd; it is a key of" in told

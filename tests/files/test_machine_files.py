@@ -139,7 +139,7 @@ STRUCTURE = {
     "write 'rotary-pd'": (
         two_mass(), {"bodies": {"motor": ss.machine.RotatingBody(), "table": ss.machine.SlidingBody()}},
         "drive.control"),
-    "does not; between these two: kind = 'spring'": (
+    "does not; kinds of link for these ends: 'spring'": (
         two_mass(), {"links": {"screw": ss.machine.Screw(between=BOTH, lead=1.0, stiffness=1.0)}},
         "links.screw.between"),
     'exchange the two: between = ["motor", "table"]': (
@@ -152,7 +152,7 @@ STRUCTURE = {
     "unknown body 'tble'": (
         two_mass(), {"drive": ss.machine.PositionPD(velocity=1.0, velocity_of="tble", body="motor", kp=1.0)},
         "drive.velocity_of"),
-    "does not move away from the surface": (
+    "cannot move away from the surface": (
         two_mass(), {"links": {"screw": ss.machine.Spring(between=BOTH, stiffness=1.0, angle=0.1)}}, "links.screw"),
     "unknown link 'belt'": (
         two_mass(), {"contacts": {"g": surface("table", ROCK, loaded_by="belt")}}, "contacts.g.loaded_by"),
@@ -160,12 +160,12 @@ STRUCTURE = {
         two_mass(), {"contacts": {"g": ss.machine.Surface(body="table", friction=rate_state(1, 0, 1),
                                                   contact=ss.laws.Compliant(normal_stiffness=1.0))}},
                                                   "contacts.g.contact"),
-    "nothing carries it": (
+    "has no support": (
         brake(ROCK), {"contacts": {"disc": surface("pad", ROCK)},
                       "links": {"arm": ss.machine.Spring(between=("drive", "pad"), stiffness=1.0)}}, "bodies.pad"),
-    "slip is a radius": (
+    "slip is radius times": (
         three_bodies(), {"contacts": {"g": surface("motor", rate_state(1, 0, 1))}}, "contacts.g.radius"),
-    "there are none": (two_mass(), {"contacts": {}}, "contacts"),
+    "needs at least one": (two_mass(), {"contacts": {}}, "contacts"),
     "stands still": (
         two_mass(), {"bodies": {**two_mass().bodies, "post": ss.machine.SlidingBody()},
                      "links": {**two_mass().links, "bolt": ss.machine.Spring(between=("ground", "post"),
@@ -197,7 +197,7 @@ def test_names_must_fit_into_dotted_names():
 
 
 def test_a_sliders_contact_cannot_be_compliant():
-    with pytest.raises(ss.ParameterError, match="describe it as a machine"):
+    with pytest.raises(ss.ParameterError, match="describe the rig as a machine"):
         ss.Slider(
             friction=rate_state(1, 0, 1),
             contact=ss.laws.Compliant(normal_stiffness=1.0),

@@ -66,15 +66,15 @@ def test_an_edge_of_hunting_is_refined(tmp_path):
 REFUSED = {
     "steady sliding": (
         lambda: ss.Map(axis(**THEORY), GAINS, ["status"]),
-        "'status' is of steady sliding, and the drive",
+        "'status' needs steady sliding, but the drive",
     ),
     "a drive that moves": (
         lambda: ss.Map(ss.read_rig("examples/stick-slip.toml"), {"stiffness": [1e9]}, ["hunt"]),
-        "'hunt' is of a drive that holds a place",
+        "'hunt' is only for a drive that holds a place",
     ),
     "another velocity": (
         lambda: ss.Map(axis(**THEORY), {"drive.velocity": [0.0, 1.0]}),
-        "so that its velocity is 0",
+        "so that its velocity must be 0",
     ),
     "a value": (lambda: ss.Map(axis(**THEORY), {"drive.kp": [-1.0, 1.0]}), "got -1"),
     "no mass": (lambda: ss.Map(axis(**THEORY | {"mass": 0.0}), GAINS), "'hunt' is not offered: .* no mass"),

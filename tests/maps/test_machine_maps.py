@@ -100,7 +100,7 @@ edge = {{ along = "{name}" }}
 @pytest.mark.parametrize(
     ("compute", "words"),
     [
-        ("critical_stiffness", "the one stiffness of a slider"), ("stable_stiffness", "the one stiffness of a slider"),
+        ("critical_stiffness", "is only for sliders"), ("stable_stiffness", "is only for sliders"),
         ("edge", r"map.edge.along: missing; .* such as 'links.screw.stiffness'"),
         (ss.maps.Edge(along="drive.velocity"), "do not depend on drive.velocity linearly"),
         (ss.maps.LogMargin(along="drive.kpp"), "drive.kp"),

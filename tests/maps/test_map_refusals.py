@@ -209,7 +209,7 @@ def test_everything_wrong_with_a_map_is_said_at_once():
     for part in (
         "did you mean 'contact.angle'", "compute: unknown measure 'stattus'; did you mean 'status'",
         "map.over.slider.stiffness.to: ",
-        "a value comes twice", "allowed: a Grid", "friction.a.to: got -0.02", "friction.d_c.from: got 0.0",
+        "has a value twice", "allowed: a Grid", "friction.a.to: got -0.02", "friction.d_c.from: got 0.0",
         "samples.points: got 0", "unknown method 'sobbol'", "seed: got -1", "chunk: got 0", "events.until: missing",
     ):  # fmt: skip
         assert part in text, (part, text)
@@ -217,7 +217,7 @@ def test_everything_wrong_with_a_map_is_said_at_once():
         ss.Map(rig())
     with pytest.raises(ss.ParameterError, match="varies twice"):
         ss.Map(rig(), {"friction.a": [0.01]}, samples={"friction.a": [0.01, 0.02]})
-    with pytest.raises(ss.ParameterError, match="nothing that is computed simulates"):
+    with pytest.raises(ss.ParameterError, match="no measure simulates"):
         ss.Map(rig(), {"protocol.pieces.1.to": [1e-6]}, protocol=ss.protocol.VelocityStep(at=1.0, to=2e-6))
     with pytest.raises(ss.ParameterError, match="Latin hypercube"):
         sampling(2 * LARGEST_HYPERCUBE, method="latin-hypercube")
@@ -231,7 +231,7 @@ def test_everything_wrong_with_a_map_is_said_at_once():
             ss.Map(rig(), {"angle": ANGLES}, compute)
     with pytest.raises(ss.ParameterError, match="samples: is empty"):
         ss.Map(rig(), samples={})
-    with pytest.raises(ss.ParameterError, match="two ends"):
+    with pytest.raises(ss.ParameterError, match=r"allowed: \(low, high\)"):
         ss.Map(rig(), samples=ss.maps.Samples({"angle": 5}, 8))
     with pytest.raises(ss.ParameterError, match="differ in length"):
         make_sampling({"friction.a": [0.01], "friction.b": [0.01, 0.02]}, roles(chart()) | {

@@ -392,7 +392,7 @@ def test_a_structure_that_nothing_presses_has_no_force_of_minus_zero():
 def test_a_point_needs_two_degrees_of_freedom(tmp_path):
     mass, damping, stiffness = reed_matrices()
     np.savez(tmp_path / "reed.npz", M=mass, C=damping, K=stiffness)
-    with pytest.raises(ss.RigFileError, match=r"points.tip.y: is 58, as x; allowed: another degree of freedom"):
+    with pytest.raises(ss.RigFileError, match=r"points.tip.y: is 58, the same as x; allowed: another"):
         ss.read_rig(written(tmp_path, "reed.npz", "x = 58\ny = 58"))
 
 

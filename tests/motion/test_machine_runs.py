@@ -192,7 +192,10 @@ def test_a_command_draws_the_phase_plane_of_a_contact_in_the_units_of_the_file(t
     wrong = cli("simulate", str(path), *step, "--contact", "seel", "-o", str(tmp_path / "plane.svg"))
     assert (wrong.returncode, "unknown contact 'seel'; did you mean 'seal'" in wrong.stderr) == (2, True)
     one = cli("simulate", str(ROOT / "examples" / "stick-slip.toml"), "--contact", "seal")
-    assert (one.returncode, "a slider has one contact, leave it out" in one.stderr) == (2, True)
+    assert (one.returncode, "one contact without a name; leave the argument out" in one.stderr) == (
+        2,
+        True,
+    )
 
 
 def test_what_helps_a_run_that_ends_is_said_of_a_machine_or_a_slider():

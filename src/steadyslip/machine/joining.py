@@ -1,4 +1,4 @@
-"""Rigid links: removal of links of a machine by joining the bodies at their ends."""
+"""Replacement of links by rigid ones: the link is removed and its two bodies become one."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND, LOAD_POINT
 from steadyslip.machine.surfaces import Surface
 
-_RATIO_TOLERANCE = 1e-12  # relative; products of a few ratios that should be 1 differ from it by some 1e-16
-_LINK = Tested("the name of a link; further names are arguments of their own", lambda value: isinstance(value, str))
+_RATIO_TOLERANCE = 1e-12  # largest |ratio - 1| that counts as rounding; products of a few ratios have some 1e-16
+_LINK = Tested("the name of a link; give several names as separate arguments", lambda value: isinstance(value, str))
 
 
 @checked(links=_LINK)
@@ -23,7 +23,7 @@ def joined(machine: Machine, *links: str) -> Machine:
     """Copy of a machine in which given links are rigid: each is removed, and its two bodies become one.
 
     A rotating and a sliding body can be joined: a screw's inertia J becomes a mass J/lead² of the table, or the table's
-    mass m an inertia m lead² of the screw. Links and contacts of the removed body are transferred to the other.
+    mass m an inertia m lead² of the screw. Links and contacts of the removed body are transferred to the joint body.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def joined(machine: Machine, *links: str) -> Machine:
     Returns
     -------
     Machine
-        The joint body has the name of the link's first end, unless the drive acts on the second, or only the second
-        can take over the other's contacts.
+        The joint body has the name of the link's first end, unless the drive acts on the second body, or only the
+        second can take over the contacts of both.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def joined(machine: Machine, *links: str) -> Machine:
         If a link does not exist.
     NotAvailable
         If a link ends at the ground or the drive, an end moves away from the surface, a contact law depends on the
-        force of the link (`loaded_by`), or neither body can take over links and contacts of the other.
+        force of the link (`loaded_by`), or neither body can take over the other's links and contacts.
 
     Examples
     --------
@@ -69,10 +69,10 @@ def _without_link(machine: Machine, name: str) -> Machine:
                 "by itself; leave that body out, or give the link a stiffness"
             )
         if machine.bodies[end].lifts or "y" in link.directions():
-            raise NotAvailable(f"links.{name} cannot be rigid: it holds a body that moves away from the surface")
+            raise NotAvailable(f"links.{name} cannot be rigid: one of its bodies moves away from the surface")
     for contact, surface in machine.contacts.items():
         if surface.loaded_by == name:
-            raise NotAvailable(f"links.{name} cannot be rigid: contacts.{contact} sees its force (loaded_by)")
+            raise NotAvailable(f"links.{name} cannot be rigid: contacts.{contact} depends on its force (loaded_by)")
     ratio = float(link.ratio())
     trials = [(first, second, ratio), (second, first, 1 / ratio)]
     if machine.drive.driven() == second:
@@ -91,7 +91,7 @@ def _other_end(link: Link, end: str) -> str:
 
 
 def _merged(machine: Machine, name: str, kept: str, gone: str, ratio: float) -> Machine:
-    """Copy of a machine with body `gone` joined to `kept`; `gone` moves `ratio` times as fast."""
+    """Copy of a machine with body `gone`, which moves `ratio` times as fast as `kept`, joined to `kept`."""
     bodies = dict(machine.bodies)
     bodies[kept] = _joint_body(bodies[kept], bodies.pop(gone), ratio)
     links = {}
@@ -116,7 +116,7 @@ def _is_one(ratio: float) -> bool:
 
 
 def _joint_body(body: Body, other: Body, ratio: float) -> Body:
-    """Copy of `body` with added inertia and constant force of `other`, which moves `ratio` times as fast."""
+    """Copy of `body` with inertia and constant force of `other` added, which moves `ratio` times as fast."""
     inertia = body.inertia_of() + ratio**2 * other.inertia_of()
     force = body.along() + ratio * other.along()
     if isinstance(body, RotatingBody):
@@ -125,7 +125,7 @@ def _joint_body(body: Body, other: Body, ratio: float) -> Body:
 
 
 def _moved_link(machine: Machine, name: str, link: Link, kept: str, gone: str, ratio: float) -> Link:
-    """Equivalent of a link to body `gone` that holds body `kept` instead."""
+    """Link at body `kept` that is equivalent to a link at body `gone`."""
     shares = dict(zip(link.between, (-float(link.ratio()), 1.0), strict=True))
     other = _other_end(link, gone)
     own, far = shares[gone] * ratio, shares[other]
@@ -145,16 +145,18 @@ def _moved_link(machine: Machine, name: str, link: Link, kept: str, gone: str, r
     if turning[other]:
         return Screw(between=(other, kept), lead=abs(far / own), **values(own))
     if not _is_one(abs(far / own)):
-        raise NotAvailable(f"links.{name} would tie two bodies that slide at unlike speeds; allowed: one that turns")
+        raise NotAvailable(
+            f"links.{name} would tie two bodies that slide at different speeds; one of them must turn for that"
+        )
     return Spring(between=(other, kept), **values(own))
 
 
 def _moved_contact(machine: Machine, name: str, surface: Surface, kept: str, gone: str, ratio: float) -> Surface:
-    """Equivalent of a contact of body `gone` for body `kept`."""
+    """Contact of body `kept` that is equivalent to a contact of body `gone`."""
     if surface.against == gone or not machine.bodies[kept].turns:
         if not _is_one(ratio) or machine.bodies[kept].turns != machine.bodies[gone].turns:
             raise NotAvailable(
-                f"contacts.{name}: {kept!r} cannot rub there in place of {gone!r}, which moves otherwise"
+                f"contacts.{name}: {kept!r} cannot slide there in place of {gone!r}, whose motion is another"
             )
         return replace(surface, against=kept) if surface.against == gone else replace(surface, body=kept)
     return replace(surface, body=kept, radius=ratio * (1.0 if surface.radius is None else surface.radius))

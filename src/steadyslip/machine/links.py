@@ -18,7 +18,7 @@ class Link(FrozenRecord, family="link"):
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("kind", "spring")
     turning: ClassVar[tuple[bool | None, bool | None]] = (False, False)
-    """For each end, True if it must rotate, False if it must slide; None for either."""
+    """For each end, True if it must rotate, False if it must slide, None if it may do either."""
 
     between: tuple[str, ...] = setting(Names("the two ends: names of bodies, ground or drive"))
 
@@ -31,7 +31,7 @@ class Link(FrozenRecord, family="link"):
             yield Problem("stiffness", "missing; give stiffness, damping or both")
 
     def rigidity(self) -> Any:
-        """Stiffness (N/m or N m/rad), None for a dashpot alone."""
+        """Stiffness (N/m or N m/rad); None for a link with a dashpot only."""
         raise NotImplementedError
 
     def dashpot(self) -> Any:
@@ -43,7 +43,7 @@ class Link(FrozenRecord, family="link"):
         return bool(self.dashpot() != 0)
 
     def ratio(self) -> Any:
-        """Speed of the second end per speed of the first without stretch."""
+        """Speed of the second end divided by that of the first while the stretch is constant."""
         return 1
 
     def keeps_pace(self) -> bool:
@@ -56,7 +56,7 @@ class Link(FrozenRecord, family="link"):
 
 
 class Spring(Link, name="spring"):
-    """A spring and a dashpot between bodies that slide; at an angle where they move in the plane."""
+    """A spring and a dashpot between bodies that slide; may be at an angle if they also move away from the surface."""
 
     stiffness: float | None = parameter(
         "N/m", positive, "stiffness k along the link", default=None, kind="stiffness", letter="k"
@@ -77,7 +77,7 @@ class Spring(Link, name="spring"):
     def inconsistencies(self) -> Iterator[Problem]:
         yield from super().inconsistencies()
         if self.direction == "normal" and self.angle != 0:
-            yield Problem("angle", "given beside direction normal, which is an angle of 90 deg; give one of the two")
+            yield Problem("angle", "given with direction = 'normal', which means 90 deg; give only one of the two")
 
     def rigidity(self) -> Any:
         return self.stiffness
@@ -99,7 +99,7 @@ class Spring(Link, name="spring"):
 class Screw(Link, name="screw"):
     """A screw, rack or belt between a body that turns and one that slides: stretch x − lead · φ.
 
-    `between` names first the body that turns. Stiffness and damping are those along the slide.
+    `between` names the body that turns first. Stiffness and damping are along the slide.
     """
 
     turning: ClassVar[tuple[bool | None, bool | None]] = (True, False)

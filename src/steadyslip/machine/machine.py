@@ -39,11 +39,11 @@ from steadyslip.machine.surfaces import Surface
 from steadyslip.protocol import protocol
 from steadyslip.protocol.protocol import Piece
 
-_SPEED_TOLERANCE = 1e-9  # relative difference of two speeds of one end that counts as rounding; chosen by trial
+_SPEED_TOLERANCE = 1e-9  # relative difference of an end's speeds by two routes that counts as rounding; chosen by trial
 
 
 class Machine(Rig):
-    """Bodies that slide or turn, tied to each other by links, on one contact or several (theory 11).
+    """Bodies that slide or turn, tied to each other by links, with one contact or several (theory 11).
 
     Quantities are forces, not stresses: masses in kg, stiffnesses in N/m. In steady sliding all bodies move at constant
     speeds in fixed ratios to the drive's velocity. Parameters have dotted names such as ``bodies.table.mass``,
@@ -51,11 +51,11 @@ class Machine(Rig):
     """
 
     area: ClassVar[None] = None
-    """Area of a slider, by which its stresses are shown as forces; results of a machine are forces already."""
+    """None: an area (m²) converts a slider's stresses to forces; results of a machine are forces already."""
     in_forces: ClassVar[bool] = True
 
     fed: ClassVar[str | None] = None
-    """Body whose speed was given in place of the drive's, by which the drive's is told; no part of the value."""
+    """Body in `velocity_of`, whose speed the user gave; drive.velocity is printed as its speed; not compared by ==."""
 
     words: ClassVar[Mapping[str, str]] = {
         "rig": "machine", "block": "body", "place": "bodies.{}", "damping": "a dashpot to the ground",
@@ -70,7 +70,7 @@ class Machine(Rig):
     # -- checks
 
     def _settled(self) -> Iterator[Problem]:
-        """Convert a velocity that is given at another body (`velocity_of`) to that of the drive."""
+        """Convert the velocity of another body (`velocity_of`) to that of the drive; yield Problems if impossible."""
         yield from super()._settled()
         name = self.drive.velocity_of
         if name is None or not all(len(link.between) == 2 for link in self.links.values()):
@@ -79,7 +79,7 @@ class Machine(Rig):
         yield from unknown
         speed = self._speeds()[0].get(name)
         if unknown or speed is None:
-            return  # a body that floats is reported with the others
+            return  # `inconsistencies` reports bodies whose speed is undetermined
         if not speed > 0:
             does = "stands still" if speed == 0 else "moves backwards"
             yield Problem(where, f"{name!r} {does} in steady sliding; name a body that moves forwards")
@@ -101,7 +101,7 @@ class Machine(Rig):
         return float(self._speeds()[0][self.fed]) / pace, bool(self._turns(self.fed))
 
     def ratios(self) -> dict[str, float]:
-        """Steady motion of every body for one of the drive."""
+        """Steady speed of each body divided by that of the drive, by name (1, or m or rad per m or rad)."""
         speeds, pace = self._speeds()[0], 1.0 if self.holds else float(self.drive.velocity)
         return {name: float(speeds[name]) / pace for name in self.bodies if name in speeds}
 
@@ -121,7 +121,7 @@ class Machine(Rig):
     def inconsistencies(self) -> Iterator[Problem]:
         faults = [*self._name_problems(), *self._end_problems()]
         if self.holds and any(body.is_structure for body in self.bodies.values()):
-            yield Problem("drive.velocity", "got 0; a place is held of bodies, not with a structure; allowed: > 0")
+            yield Problem("drive.velocity", "got 0; a machine with a structure cannot hold a place; allowed: > 0")
         yield from faults
         if not faults:
             yield from self._contact_problems()
@@ -134,28 +134,28 @@ class Machine(Rig):
     def _name_problems(self) -> Iterator[Problem]:
         for name in (GROUND, LOAD_POINT):
             if name in self.bodies:
-                yield Problem(f"bodies.{name}", "is what links and contacts call something else; give another name")
+                yield Problem(f"bodies.{name}", "is a reserved name in links and contacts; give the body another name")
         for kind, what in (("bodies", self.bodies), ("contacts", self.contacts)):
             if not what:
-                yield Problem(kind, f"there are none; a machine has one or more, [{kind}.NAME]")
+                yield Problem(kind, f"missing; a machine needs at least one, in a table [{kind}.NAME]")
 
     def _end(self, where: str, name: str, allowed: tuple[str, ...] = (GROUND, LOAD_POINT)) -> Iterator[Problem]:
         return unknown_body(where, name, [*self.ends(), *allowed])
 
     def ends(self) -> tuple[str, ...]:
-        """What links and contacts may name: bodies, and of structures the points, such as ``caliper.pad``."""
+        """Names to which links and contacts can refer: bodies, and points of structures such as ``caliper.pad``."""
         return tuple(
             end for name, body in self.bodies.items()
             for end in ([f"{name}.{one}" for one in body.point_names()] if body.is_structure else [name])
         )  # fmt: skip
 
     def _structure_at(self, end: str) -> tuple[str, StructureBody, str] | None:
-        """Name, body and point of an end at a structure; None for others."""
+        """Name, body and point of an end that is a point of a structure; None for other ends."""
         name, _, point = end.partition(".")
         return (name, self.bodies[name], point) if point and name in self.bodies else None
 
     def _end_problems(self) -> Iterator[Problem]:
-        """Yield Problems with ends of links, contacts and drive: unknown bodies, or the wrong kind of motion."""
+        """Yield Problems for ends of links, contacts and drive: unknown bodies, or the wrong kind of motion."""
         for name, link in self.links.items():
             problems = [wrong for end in link.between for wrong in self._end(f"links.{name}.between", end)]
             yield from problems
@@ -164,12 +164,12 @@ class Machine(Rig):
             kept = [end for end in link.between if end not in (GROUND, LOAD_POINT) and not self._lifts(end)]
             if "y" in link.directions() and kept:
                 message = (
-                    f"pulls at an angle, but {kept[0]!r} does not move away from the surface, so that it is open what "
-                    "carries it; make it a body that moves in the plane, or give its contact the law inclined-spring"
+                    f"pulls at an angle, but {kept[0]!r} cannot move away from the surface, so that its support is not "
+                    "defined; write motion = 'plane' for it, or give its contact the law inclined-spring"
                 )
                 yield Problem(f"links.{name}", message)
             if set(link.between) == {GROUND, LOAD_POINT}:
-                yield Problem(f"links.{name}.between", "links no body; allowed: a body at one end at least")
+                yield Problem(f"links.{name}.between", "has no body at either end; name a body at one end at least")
         for name, surface in self.contacts.items():
             yield from self._end(f"contacts.{name}.body", surface.body, (LOAD_POINT,))
             yield from self._end(f"contacts.{name}.against", surface.against)
@@ -189,22 +189,22 @@ class Machine(Rig):
                 yield wrong_control(self.drive.name, str(self.drive.driven()), body.turns)
 
     def _fits(self, kind: type[Link], ends: Sequence[str]) -> bool:
-        """True if the ends turn or slide as those of a kind of link do."""
+        """True if each end turns or slides as a kind of link requires."""
         return all(self._turns(end) in (turning, None) for end, turning in zip(ends, kind.turning, strict=True))
 
     def _wrong_ends(self, name: str, link: Link) -> Problem:
-        """Problem of a link with an end that turns where it should slide, or the reverse; with what would be right."""
+        """Problem for a link with an end that turns but should slide, or the reverse; the message proposes a remedy."""
         first, second = link.between
         wrong = next(end for end, turning in zip(link.between, link.turning, strict=True)
                      if self._turns(end) not in (turning, None))  # fmt: skip
-        message = f"{wrong!r} {'turns' if self._turns(wrong) else 'slides'}, which this end of a {link.name} does not; "
+        message = f"{wrong!r} {'turns' if self._turns(wrong) else 'slides'}, but this end of a {link.name} does not; "
         if self._fits(type(link), (second, first)):
             message += f"exchange the two: between = {json.dumps([second, first])}"
         elif wrong == LOAD_POINT and self.drive.driven() is None:
             message += f"write control = {control_for(self.drive.name, not self.drive.turns)!r} in [drive]"
         else:
             fits = [repr(kind) for kind, one in Link.registry.items() if self._fits(one, link.between)]  # type: ignore[arg-type]
-            message += f"between these two: kind = {' or '.join(fits)}" if fits else "see the kinds of link"
+            message += f"kinds of link for these ends: {' or '.join(fits)}" if fits else "see the kinds of link"
         return Problem(f"links.{name}.between", message)
 
     def _turns(self, end: str) -> bool | None:
@@ -224,13 +224,11 @@ class Machine(Rig):
             where, ends = f"contacts.{name}", (surface.body, surface.against)
             turning = [bool(self._turns(end)) for end in ends]
             if turning[0] and surface.radius is None:
-                yield Problem(
-                    f"{where}.radius", f"missing; {surface.body!r} turns, so slip is a radius times its angle"
-                )
+                yield Problem(f"{where}.radius", f"missing; {surface.body!r} turns, and its slip is radius times angle")
             if surface.radius is not None and not turning[0]:
                 yield Problem(f"{where}.radius", f"given, but {surface.body!r} does not turn")
             if turning[1]:
-                yield Problem(f"{where}.against", f"{surface.against!r} turns; name the body that turns as body")
+                yield Problem(f"{where}.against", f"{surface.against!r} turns; exchange body and against")
             lifting = any(map(self._lifts, ends))
             if surface.contact.is_compliant() and not lifting:
                 yield Problem(
@@ -239,10 +237,10 @@ class Machine(Rig):
                 )  # fmt: skip
             link = self.links.get(surface.loaded_by)
             if link is not None and surface.held not in link.between:
-                yield Problem(f"{where}.loaded_by", f"the link {surface.loaded_by!r} does not hold {surface.held!r}")
+                yield Problem(f"{where}.loaded_by", f"the link {surface.loaded_by!r} does not end at {surface.held!r}")
             elif link is not None and "x" not in link.directions():
                 message = (
-                    f"the link {surface.loaded_by!r} pulls away from the surface only; allowed: one along the slide"
+                    f"the link {surface.loaded_by!r} pulls only away from the surface; allowed: a link along the slide"
                 )
                 yield Problem(f"{where}.loaded_by", message)
         for name, body in self.bodies.items():
@@ -250,7 +248,7 @@ class Machine(Rig):
             held = any(name in link.between and "y" in link.directions() for link in self.links.values())
             if body.lifts and not carried and not held:
                 yield Problem(
-                    f"bodies.{name}", "nothing carries it: no compliant contact, and no link away from the surface"
+                    f"bodies.{name}", "has no support: give it a compliant contact, or a link away from the surface"
                 )
 
     def _floating(self) -> Iterator[Problem]:
@@ -266,21 +264,21 @@ class Machine(Rig):
                 yield Problem("drive.measured", f"{body!r} stands still in steady sliding; measure a body that moves")
 
     def _held(self, name: str, body: StructureBody, speeds: Mapping[str, Any]) -> Iterator[Problem]:
-        """Yield a Problem with a structure whose motion in steady sliding is open."""
+        """Yield a Problem for a structure whose motion in steady sliding is undetermined."""
         free = body.data.rigid_motions.shape[1]
         if free > 1:
             yield Problem(
-                f"bodies.{name}.matrices", f"leave the structure free to move in {free} ways; allowed: none, or one "
-                "along the slide; hold it by the stiffness in the matrices",
+                f"bodies.{name}.matrices", f"leave the structure {free} rigid motions; allowed: none, or one along the "
+                "slide; add supports to the stiffness matrix",
             )  # fmt: skip
         elif not any(f"{name}.{one}" in speeds for one in body.point_names()):
             yield floating_body(name)
 
     def conditions(self) -> Iterator[Condition]:
-        """Yield the conditions that loops of links are consistent and that all contacts slide forwards."""
+        """Yield the conditions that loops of links give one speed, and that all contacts slide forwards."""
         speeds, closing = self._speeds()
         for tie, speed, other in closing:
-            message = f"the links contradict each other: {tie.second} would move at {{}} and at {{}} in steady sliding"
+            message = f"the links contradict each other: {tie.second} would move at {{}} and also at {{}} m/s or rad/s"
             same = np.abs(np.asarray(speed - other)) <= _SPEED_TOLERANCE * np.abs(np.asarray(speed))
             yield Condition("drive" if tie.name == "drive" else "links", same, message, (speed, other))
         for name, surface in self.contacts.items():
@@ -309,12 +307,12 @@ class Machine(Rig):
             end: 0 for end in self.ends()
             if (at := self._structure_at(end)) is not None and not at[1].data.rigid_motions.size
         }  # fmt: skip
-        pace = 1.0 if self.holds else self.drive.velocity  # at rest the ratios of the speeds count
+        pace = 1.0 if self.holds else self.drive.velocity  # at rest only the ratios of the speeds are used
         speeds, closing = rigid_motion({LOAD_POINT: pace, GROUND: 0, **still}, self._ties())
         return {name: 0 if is_zero(speed) else speed for name, speed in speeds.items()}, closing
 
     def speeds(self) -> dict[str, Any]:
-        """Speeds of bodies and of points of structures in steady sliding (m/s or rad/s), by name."""
+        """Speeds (m/s or rad/s) of bodies and of points of structures in steady sliding, by name."""
         speeds, _ = self._speeds()
         return {name: 0 if self.holds else speeds[name] for name in self.ends()}
 
@@ -341,7 +339,7 @@ class Machine(Rig):
 
     @property
     def protocol_area(self) -> float | None:
-        return 1.0  # its loads are forces already, in quantities declared as stresses
+        return 1.0  # loads of a machine are forces, though they are declared as stresses
 
     def piece_turns(self, piece: Piece) -> bool:
         """True if the body or load point that a piece of a protocol acts on rotates."""
@@ -392,11 +390,11 @@ class Machine(Rig):
         return None
 
     def declared(self) -> dict[str, Address]:
-        """Collect the parameters; laws of contacts without an area have units of force."""
+        """Parameters by dotted name, collected anew; laws of contacts without an area have units of force."""
         return {name: self._as_measured(self._in_forces(one)) for name, one in super().declared().items()}
 
     def _as_measured(self, one: Address) -> Address:
-        """Parameter of a controller in the unit of the body that it measures, of which its encoder and band are."""
+        """Parameter with the unit of the measured body if it is a controller's dead band or encoder step."""
         if one.name not in AS_MEASURED or self.drive.driven() is None:
             return one
         return replace(one, role=as_measured(one.role, bool(self._turns(self.drive.watched()[0]))))
@@ -410,7 +408,7 @@ class Machine(Rig):
     # -- assembly
 
     def mechanism(self) -> Mechanism:
-        """Mechanism with one coordinate for every body, and a second for bodies that move away from the surface."""
+        """Mechanism with one coordinate for each body, and a second one for bodies that move away from the surface."""
         speeds, _ = self._speeds()
         coordinates = []
         for name, body in self.bodies.items():
@@ -455,7 +453,7 @@ class Machine(Rig):
         )
 
     def row(self, end: str, axis: str) -> dict[str, Any]:
-        """Row of the displacement of an end along the slide (``x``) or away from the surface (``y``)."""
+        """Row (coefficients by coordinate) of an end's motion along the slide (``x``) or off the surface (``y``)."""
         if (found := self._structure_at(end)) is not None:
             name, body, point = found
             shares = body.rows(point)[axis == "y"]
@@ -463,7 +461,7 @@ class Machine(Rig):
         return {} if end == GROUND else {end: 1} if axis == "x" else {end + NORMAL: 1} if self._lifts(end) else {}
 
     def _slip_row(self, ends: tuple[str, str], lever: Any = None) -> dict[str, Any]:
-        """Row of the slip of the first end ahead of the second."""
+        """Row (coefficients by coordinate) of the slip of the first end relative to the second."""
         return _combined((1 if lever is None else lever, self.row(ends[0], "x")), (-1, self.row(ends[1], "x")))
 
     def _separation_row(self, surface: Surface) -> dict[str, Any]:
@@ -480,7 +478,7 @@ class Machine(Rig):
         return Element(f"links.{name}", row, row, stiffness, link.dashpot(), GROUND in link.between)
 
     def _control(self, speeds: dict[str, Any]) -> tuple[tuple[Element, ...], Integral | None]:
-        """Controller as springs and dashpots that may sense other bodies than they act on, and its integral action."""
+        """Elements and integral action of the controller; it may sense other bodies than the driven one."""
         driven = self.drive.driven()
         if driven is None:
             return (), None
@@ -495,12 +493,12 @@ class Machine(Rig):
 
 
 def coordinate(name: str, place: int) -> str:
-    """Name of a degree of freedom of a structure; contains a space, so that no body has it."""
+    """Name of degree of freedom `place` (from 0) of a structure; has a space, which no name of a body can contain."""
     return f"{name} {place + 1}"
 
 
 def _combined(*parts: tuple[Any, Mapping[str, Any]]) -> dict[str, Any]:
-    """Sum of rows, each times a factor."""
+    """Sum of rows (coefficients by coordinate), each multiplied by a factor."""
     found: dict[str, Any] = {}
     for factor, row in parts:
         for name, share in row.items():
@@ -510,7 +508,7 @@ def _combined(*parts: tuple[Any, Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _structure_part(name: str, body: StructureBody, speeds: Mapping[str, Any]) -> StructurePart:
-    """Matrices of a structure, and its rigid motion with the given speeds of its points."""
+    """StructurePart of a structure: its matrices, and the rigid motion that fits the steady `speeds` of its points."""
     data = body.data
     motion, pace = np.zeros(data.size), 0
     if data.rigid_motions.shape[1] == 1:

@@ -1,7 +1,7 @@
-"""Mechanism: the elements of a rig from which the Model is assembled: coordinates, forces between them, contacts.
+"""Mechanism of a rig, from which the Model is assembled: coordinates, forces between them, contacts.
 
-Values are the rig's numbers, or symbols. A row is a linear combination of coordinates as a mapping of names to
-coefficients, such as {"table": 1, "motor": -lead}; the name `LOAD_POINT` stands for the load point, which moves at
+Values are the rig's numbers, or symbols. A *row* is a linear combination of coordinates: a mapping of their names to
+coefficients, such as {"table": 1, "motor": -lead}. The name `LOAD_POINT` stands for the load point, which moves at
 the velocity of the drive. Displacements are relative to steady sliding.
 """
 
@@ -17,14 +17,14 @@ from steadyslip.laws.friction import FrictionLaw
 Shares = Mapping[str, Any]
 LOAD_POINT, GROUND = "drive", "ground"
 NORMAL = ".normal"
-"""Suffix of a body's name: its coordinate away from the surface."""
+"""Suffix of a body's name that makes the name of its coordinate away from the surface."""
 
 
 @dataclass(frozen=True)
 class DegreeOfFreedom:
     """Coordinate of a body: name, inertia (kg or kg m²), steady speed, constant force along it, unit (m or rad).
 
-    An `inner` one is of a structure, and no result.
+    An `inner` coordinate belongs to a structure and is not reported.
     """
 
     name: str
@@ -42,13 +42,13 @@ class Element:
     Attributes
     ----------
     name : str
-        Dotted name of the link, or that of the drive; empty if its force is not reported.
+        Dotted name of the link; empty if its force is not reported.
     acts : Shares
         Row of the coordinates on which the force acts.
     senses : Shares
         Row of the stretch; for a spring equal to `acts`.
     stiffness, damping
-        Zero if there is none.
+        Per unit of stretch and of its rate; zero if absent.
     grounded : bool
         True for links to the ground: their force is not part of the spring force T of contact laws.
     delay
@@ -79,7 +79,7 @@ class Integral:
 
 @dataclass(frozen=True)
 class Limits:
-    """What sets a controller that holds a place apart from its linear terms; SI units, None where there is none.
+    """Nonlinear parts of a controller that holds a place, in SI units; None for those it does not have.
 
     Attributes
     ----------
@@ -88,13 +88,13 @@ class Limits:
     force, integral : float or None
         Largest force of all terms, and of the integral term.
     dead_band : float or None
-        Error up to which there is none; with `of_integral` for the integral alone.
+        Largest error that counts as zero; with `of_integral` only for the integral.
     sample_time : float or None
-        Time between samples; the force is constant between.
+        Time (s) between samples; the force is constant in between.
     resolution : float or None
         Step of the encoder.
 
-    Those with a length are in the unit of the drive, as the places of the controller.
+    `dead_band` and `resolution` are displacements of the driven body (m or rad).
     """
 
     on_measurement: bool = False
@@ -106,7 +106,7 @@ class Limits:
     resolution: float | None = None
 
     def over(self, ratio: float) -> Limits:
-        """The same with lengths over a ratio."""
+        """Copy with `dead_band` and `resolution` divided by a ratio."""
         band, step = (None if one is None else one / ratio for one in (self.dead_band, self.resolution))
         return replace(self, dead_band=band, resolution=step)
 
@@ -120,12 +120,12 @@ class ContactPort:
     name : str
         Name of the contact; empty for a slider.
     slip, separation : Shares
-        Row of the slip, and row of the distance of the surfaces; the latter is empty if the bodies cannot separate.
+        Rows of the slip and of the distance of the surfaces; `separation` is empty if the bodies cannot separate.
     area : float or 1
         Area (m²) over which the stresses act; 1 if the laws are in forces.
     loaded_by : str
         Element whose force and stiffness the contact law uses as T and k; if empty, T is the sum of all elements that
-        pull at the body, and k the stiffness between it and the load point.
+        pull at the body, and k the stiffness between the body and the load point.
     """
 
     name: str
@@ -139,18 +139,18 @@ class ContactPort:
 
 @dataclass(frozen=True, eq=False)
 class StructurePart:
-    """A structure in a mechanism: coordinates of its degrees of freedom, and its matrices.
+    """A structure in a mechanism: coordinates of its n degrees of freedom, and its matrices (SI units).
 
     Attributes
     ----------
     name : str
     coordinates : tuple of str
-        Names that rows use, one for every degree of freedom.
+        Names of the n coordinates in rows.
     mass, damping, stiffness : ndarray (n, n)
     force, motion : ndarray (n,)
-        Constant forces, and the motion as a rigid body in steady sliding.
+        Constant forces, and the shape of the rigid motion in steady sliding.
     pace
-        Its speed: degrees of freedom move at `motion` · `pace`.
+        Speed of the rigid motion: degrees of freedom move at `motion` · `pace`.
     """
 
     name: str
@@ -176,11 +176,11 @@ class Mechanism:
     velocity
         Velocity of the drive (m/s or rad/s).
     gain
-        Stiffness that a controller adds to that of a slider.
+        Stiffness that the controller of a slider adds to the spring's.
     axial_share
-        Ratio of a slider's stiffness along the slide to that along its axis, if the latter is given; else None.
+        Stiffness of a slider along the slide divided by its `axial_stiffness`; None if the latter is not given.
     limits : Limits or None
-        Of the controller, if there is one.
+        Nonlinear parts of the controller; None without one.
     """
 
     coordinates: tuple[DegreeOfFreedom, ...]
@@ -195,10 +195,10 @@ class Mechanism:
     limits: Limits | None = None
 
     def pulling(self, port: ContactPort) -> list[Element]:
-        """Elements whose forces are the pull T at a contact.
+        """Elements whose forces add up to the pull T at a contact.
 
-        Unless one is named these are all but those to the ground; those to the ground alone for a body that lies on the
-        moving load point.
+        That is the element in `loaded_by` if given, else all elements that do not end at the ground. For a body that
+        lies on the moving load point it is all elements that do not end at the load point.
         """
         if port.loaded_by:
             return [one for one in self.elements if one.name == port.loaded_by]

@@ -1,4 +1,4 @@
-"""Measured frequency responses of a structure: receptances between named points and directions (theory 13, Route 2)."""
+"""Measured frequency responses: receptances between named points and directions (theory 13, Route 2)."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.pages import Displayed
 
-_OF_PHASE = 0.05  # rad; errors of phase that careful measurements have
+_OF_PHASE = 0.05  # rad; phase error of careful measurements
 MOST_LINES = 2**19
 """Most frequencies of one response; an analyser gives some thousands."""
-_FEWEST = 8  # frequencies: the lowest octave and the highest are looked at by themselves
+_FEWEST = 8  # fewest frequencies, because the lowest and the highest octave are evaluated separately
 
 
 @dataclass(frozen=True, eq=False)
 class ResponseData(Displayed):
-    """Receptances of a structure whose contacts are open, with the drive as in service.
+    """Receptances of a structure, measured with its contacts open and its drive in operation.
 
     Attributes
     ----------
     omega : ndarray (p,)
         Frequencies (rad/s), rising.
     receptance : ndarray (p, d, d)
-        Displacement of the first direction by a force in the second (m/N), complex; NaN where it was not measured.
+        Complex displacement in direction i per force in direction j (m/N), at [:, i, j]; NaN where not measured.
     deviation : ndarray (p, d, d)
-        Standard deviation of its complex error (m/N); zero where nothing tells it.
+        Standard deviation of the receptance's complex error (m/N); zero where it is unknown.
     names : tuple of str
-        The d points with directions: ``tip.x``, ``tip.y``.
+        The d directions, each as point and axis: ``tip.x``, ``tip.y``.
     source : str
         Name of the file; empty if made in Python.
     """
@@ -59,33 +59,33 @@ class ResponseData(Displayed):
         elif not (self.omega[0] >= 0 and np.all(np.diff(self.omega) > 0) and np.isfinite(self.omega[-1])):
             i = int(np.argmin((np.diff(self.omega, prepend=-1.0) > 0) & np.isfinite(self.omega)))
             after = f" after {self.omega[i - 1] / (2 * np.pi):.6g} Hz" if i else ""
-            came = f"has {self.omega[i] / (2 * np.pi):.6g} Hz{after} (number {i + 1})"
-            yield Problem("omega", f"{came}; allowed: frequencies >= 0 that rise")
+            found = f"has {self.omega[i] / (2 * np.pi):.6g} Hz{after} (number {i + 1})"
+            yield Problem("omega", f"{found}; allowed: frequencies >= 0 that rise")
         if wrong := [name for name in self.names if not name.endswith((".x", ".y"))]:
             yield Problem("names", f"has {wrong[0]!r}; allowed: points with directions, such as 'tip.x' and 'tip.y'")
         for name in ("receptance", "deviation"):
             if (found := getattr(self, name).shape) != shape:
-                yield Problem(name, f"has shape {found}; allowed: {shape}, frequencies and twice the names")
+                yield Problem(name, f"has shape {found}; allowed: {shape}, (frequencies, names, names)")
 
     @cached_property
     def full(self) -> tuple[NDArray[np.complex128], Array]:
-        """Receptance and deviation, where one of two that are alike by reciprocity was measured with both."""
+        """Receptance and deviation (p, d, d), with missing entries [:, i, j] filled from [:, j, i] by reciprocity."""
         other, error = (np.swapaxes(one, 1, 2) for one in (self.receptance, self.deviation))
         lost = np.isnan(self.receptance)
         return np.where(lost, other, self.receptance), np.where(lost, error, self.deviation)
 
     def feeding(self) -> dict[str, float]:
-        """Shares of the frequencies at which a point does work on what pushes it there, by name and direction.
+        """Share of frequencies at which the structure does work on the force at a point, by point and axis.
 
-        A structure that only stores and loses energy lags behind: its receptance has no positive imaginary part. Parts
-        that errors, or a phase of 3 deg, may have made do not count.
+        The response of a passive structure lags: the imaginary part of its driving-point receptance is not positive.
+        Positive parts below three standard deviations, or a phase of 3 deg, do not count.
         """
         own, error = (np.einsum("pii->pi", one) for one in (self.receptance, self.deviation))
         shares = np.mean(own.imag > 3 * error + _OF_PHASE * np.abs(own), axis=0)
         return dict(zip(self.names, map(float, shares), strict=True))
 
     def points(self) -> dict[str, tuple[Array | None, Array | None]]:
-        """Rows over the names of displacements of the points, along x and along y."""
+        """Unit rows (d,) that select the x and y displacements of each point from `names`; None where not measured."""
         rows = dict(zip(self.names, np.eye(len(self.names)), strict=True))
         ends = dict.fromkeys(name.rpartition(".")[0] for name in self.names)
         return {end: (rows.get(f"{end}.x"), rows.get(f"{end}.y")) for end in ends}

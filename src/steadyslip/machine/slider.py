@@ -38,13 +38,13 @@ class Slider(Rig, section="slider"):
         "mass": "the slider mass or radiation_damping",
     }  # fmt: skip
     bodies: ClassVar[Mapping[str, Any]] = {}
-    """Named bodies, as of a `Machine`; a slider's block has no name."""
+    """Empty: the block of a slider has no name; a `Machine` has named bodies."""
     contacts: ClassVar[Mapping[str, Any]] = {}
-    """Named contacts, as of a `Machine`; a slider's contact has no name."""
+    """Empty: the contact of a slider has no name; a `Machine` has named contacts."""
     links: ClassVar[Mapping[str, Any]] = {}
-    """Named links, as of a `Machine`."""
+    """Empty: a slider has no named links; a `Machine` has."""
     fed: ClassVar[None] = None
-    """The body to whose motion drive.velocity refers, of a `Machine` only."""
+    """None: only a `Machine` can have a body to whose motion drive.velocity refers."""
 
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")
@@ -84,7 +84,7 @@ class Slider(Rig, section="slider"):
 
     def inconsistencies(self) -> Iterator[Problem]:
         if self.stiffness is not None and self.axial_stiffness is not None:
-            yield Problem("axial_stiffness", "given beside stiffness; give one of the two")
+            yield Problem("axial_stiffness", "given together with stiffness; give only one of the two")
         if self.axial_stiffness is not None and not self.contact.has_axis():
             yield Problem(
                 "axial_stiffness",
@@ -94,8 +94,8 @@ class Slider(Rig, section="slider"):
         if self.contact.is_compliant():
             yield Problem(
                 "contact",
-                f"the contact {self.contact.name!r} needs a body that moves away from the surface, which a "
-                "slider's does not; describe it as a machine, with a body that moves in the plane",
+                f"the contact {self.contact.name!r} needs a body that moves away from the surface, which a slider does "
+                "not; describe the rig as a machine, with motion = 'plane' for the body",
             )
 
     def conditions(self) -> Iterator[Condition]:
@@ -105,7 +105,7 @@ class Slider(Rig, section="slider"):
             yield Condition("stiffness", np.asarray(gain) > 0, message, (gain,))
 
     def stiffness_name(self) -> str:
-        """Name of the parameter that is the rig's stiffness: the spring's, along the slide or its axis, else a gain."""
+        """Dotted name of the parameter given as stiffness: of the spring, along slide or axis, or else a gain."""
         own = [name for name in self.of_kind("stiffness") if not name.startswith("drive.")]
         return (own or [name for name in self.of_kind("stiffness") if self.value(name)] or ["slider.stiffness"])[0]
 
@@ -141,13 +141,13 @@ class Slider(Rig, section="slider"):
         if name is None:
             return []
         one = "has one contact" if argument == "contact" else "is one block"
-        return [Problem(argument, f"got {name!r}; a slider {one}, leave it out")]
+        return [Problem(argument, f"got {name!r}; a slider {one} without a name; leave the argument out")]
 
     def laws_by_contact(self) -> dict[str, LawsOfContact]:
         return {"": LawsOfContact("", self.friction, self.contact)}
 
     def mechanism(self) -> Mechanism:
-        """Mechanism with one coordinate, x, and spring and controller between it and the load point."""
+        """Mechanism with one coordinate x, and with spring and controller between the block and the load point."""
         pulled = {"x": 1, LOAD_POINT: -1}
         drive = self.drive
         ki, late = drive.integral(), drive.lateness()

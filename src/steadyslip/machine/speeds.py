@@ -1,4 +1,4 @@
-"""Speeds in steady sliding: all ends that links tie to each other move in fixed ratios."""
+"""Speeds in steady sliding, where ends that are tied by links move in fixed ratios."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from steadyslip.machine.structures import StructureBody
 
 
 class Tie(NamedTuple):
-    """Coupling of two ends in steady sliding by link `name`: the second moves `ratio` times as fast as the first."""
+    """Coupling of two ends by a link in steady sliding: the second moves `ratio` times as fast as the first."""
 
     name: str
     first: str
@@ -18,7 +18,7 @@ class Tie(NamedTuple):
 
 
 def structure_ties(name: str, body: StructureBody) -> Iterator[Tie]:
-    """Yield the couplings of the points of a structure that is free to move in one way."""
+    """Yield the couplings between the points of a structure with one rigid motion; none for other structures."""
     motions = body.data.rigid_motions
     if motions.shape[1] != 1:
         return
@@ -30,12 +30,12 @@ def structure_ties(name: str, body: StructureBody) -> Iterator[Tie]:
 
 
 def rigid_motion(known: Mapping[str, Any], ties: list[Tie]) -> tuple[dict[str, Any], list[tuple[Tie, Any, Any]]]:
-    """Speeds of all ends that the ties connect to known ones, and the redundant ties.
+    """Speeds of all ends that ties connect to ends of known speed, and the redundant ties.
 
     Parameters
     ----------
     known : mapping of str
-        Known speeds: of the ground and of the load point.
+        Known speeds (m/s or rad/s), such as those of the ground and of the load point.
     ties : list of Tie
 
     Returns
@@ -60,5 +60,5 @@ def rigid_motion(known: Mapping[str, Any], ties: list[Tie]) -> tuple[dict[str, A
 
 
 def is_zero(speed: Any) -> bool:
-    """True for the number 0, not for an expression or an array."""
+    """True for the number 0; False for expressions and arrays, even if they are zero."""
     return isinstance(speed, (int, float)) and speed == 0

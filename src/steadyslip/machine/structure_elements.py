@@ -1,8 +1,8 @@
 """Structures as coordinates and elements of a mechanism, so that a Model can be assembled from them.
 
-The matrices keep all they say: displacements are written in coordinates z, u = B z, in which the inertia is diagonal
-and forces at contacts and links act on the first few only. Of a structure with symmetric stiffness the others follow
-as in a chain (band Lanczos, Golub & Van Loan, Matrix Computations, 10.1), so that equations stay short.
+Nothing is approximated: displacements u = B z are expressed in coordinates z in which the inertia is diagonal, and
+forces at contacts and links act only on the first few. If the stiffness is symmetric, the other coordinates form a
+chain (band Lanczos, Golub & Van Loan, Matrix Computations, 10.1), so that equations stay short.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.machine.mechanism import DegreeOfFreedom, Element, Mechanism, Shares, StructurePart
 
-_DEPENDENT = 1e-10  # of a direction's length left beside the directions before it, below which it is one of them
-_ROUNDING = 8 * np.finfo(float).eps  # of a matrix's norm, times its size: what products of matrices leave of zero
+_DEPENDENT = 1e-10  # a direction is dependent if less than this share of its length is orthogonal to earlier ones
+_ROUNDING = 8 * np.finfo(float).eps  # times norm and size of a matrix: bound of rounding errors in matrix products
 MOST_COORDINATES, MOST_TERMS = 100, 1500
-"""Most degrees of freedom of a structure that moves, and most entries of its damping and stiffness together: code is
-compiled for each, some half a minute for 100 in a chain or for 1500 of full matrices."""
+"""Largest number of degrees of freedom of a structure, and of entries of its damping and stiffness, for which code is
+compiled; both take some half a minute to compile."""
 
 
 def with_elements(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with structures replaced by coordinates, springs and dashpots.
+    """Copy of the mechanism with structures replaced by coordinates, springs and dashpots.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def with_elements(mechanism: Mechanism) -> Mechanism:
 
 
 def terms_of(mechanism: Mechanism) -> int:
-    """Number of entries of the matrices of structures for which code is compiled; raises as `with_elements`."""
+    """Number of matrix entries of structures for which code is compiled; NotAvailable if there are too many."""
     return sum(len(one.senses) for one in with_elements(mechanism).elements) if mechanism.structures else 0
 
 
@@ -51,7 +51,7 @@ def _with_elements(own: Mechanism, part: StructurePart) -> Mechanism:
         raise _too_large(part, f"whose matrices have {terms} entries, allowed: {MOST_TERMS}")
 
     def written(row: Shares) -> dict[str, Any]:
-        """A row in the new coordinates."""
+        """Row of the old coordinates expressed in the new ones."""
         inside = _numbers(row, names) @ basis.vectors
         kept = np.flatnonzero(np.abs(inside) > _ROUNDING * len(names) * np.max(np.abs(inside), initial=0.0))
         others = {name: share for name, share in row.items() if name not in names}
@@ -84,7 +84,7 @@ def _with_elements(own: Mechanism, part: StructurePart) -> Mechanism:
 
 
 def _rows(own: Mechanism) -> Iterable[Shares]:
-    """Rows of contacts, then of links and controllers: the directions in which forces act, or that they sense."""
+    """Yield the rows of contacts, then of links and controllers: displacements that they act on or sense."""
     for port in own.contacts:
         yield from (port.slip, port.separation)
     for one in own.elements:
@@ -104,24 +104,25 @@ def _numbers(row: Shares, names: dict[str, int]) -> Array:
 def _too_large(part: StructurePart, why: str) -> NotAvailable:
     return NotAvailable(
         f"bodies.{part.name}: motion, kicks, cycles, cures, chances and maps are not offered with "
-        f"{len(part.coordinates)} degrees of freedom, {why}; reduce them: kept_modes = 10 keeps ten "
-        "modes beside those of points, as does ss.machine.reduced"
+        f"{len(part.coordinates)} degrees of freedom, {why}; reduce them: kept_modes = 10, or "
+        "ss.machine.reduced, keeps ten modes besides the degrees of freedom of points"
     )
 
 
 def _plain(value: Any) -> Any:
-    """A number or expression, with 0 for 0.0."""
+    """The value itself, with 0.0 replaced by the integer 0, which removes terms from equations."""
     return 0 if value == 0 else value
 
 
 class _Basis:
-    """Coordinates of a structure in which few terms couple them.
+    """Coordinates z of a structure that are coupled by few terms.
 
     Attributes
     ----------
     vectors, inverse : ndarray (n, n)
-        u = vectors z, z = inverse u.
+        Transformations of displacements: u = vectors z, z = inverse u.
     inertia : ndarray (n,)
+        Inertia of each coordinate (kg).
     """
 
     def __init__(self, part: StructurePart, directions: list[Array]) -> None:
@@ -134,14 +135,14 @@ class _Basis:
         axes = _chain(even, pushed)
         size = (
             1 / np.linalg.norm(pushed[0]) if pushed else 1.0
-        )  # with which the first coordinate is the first row, in m
+        )  # scales the first coordinate to the displacement of the first direction, in m
         self.vectors = size * (lower.T @ axes)
         self.inverse = axes.T @ root.T / size
         self.inertia = np.full(len(axes), size**2)
         self.stiffness, self.damping = (size**2 * _clean(axes.T @ one @ axes) for one in (self.stiffness, self.damping))
 
     def elements(self) -> list[Element]:
-        """Springs and dashpots, each of one row of the matrices."""
+        """Springs and dashpots, one for each nonzero row of the stiffness and the damping matrix."""
         found = []
         for i, name in enumerate(self.part.coordinates):
             for matrix, own in ((self.stiffness, (1, 0)), (self.damping, (0, 1))):
@@ -152,18 +153,18 @@ class _Basis:
 
 
 def _clean(matrix: Array) -> Array:
-    """Matrix with entries of rounding as zeros."""
+    """Copy of a matrix with entries within rounding errors set to zero."""
     least = _ROUNDING * len(matrix) * np.linalg.norm(matrix, 2)
     return np.where(np.abs(matrix) > least, matrix, 0.0)
 
 
 def _chain(even: Array, first: list[Array]) -> Array:
-    """Orthonormal axes (n, n): of the directions `first`, then of what a symmetric matrix makes of those before."""
+    """Orthonormal axes as columns (n, n), by Lanczos: from directions `first`, then from `even` times earlier axes."""
     axes = np.zeros((0, len(even)))
     waiting = [*first]
     for place in range(len(even)):
         axes = _with_axis(axes, waiting, even)
-        if len(axes) <= place:  # all that forces reach: any others complete them
+        if len(axes) <= place:  # the axes span all that forces reach: complete them by any orthogonal ones
             rest = np.linalg.svd(axes)[2][len(axes) :] if len(axes) else np.eye(len(even))
             waiting = [*rest]
             axes = _with_axis(axes, waiting, even)
@@ -171,7 +172,7 @@ def _chain(even: Array, first: list[Array]) -> Array:
 
 
 def _with_axis(axes: Array, waiting: list[Array], even: Array) -> Array:
-    """Axes (k, n) and the next: of the first of those `waiting` that is not made of them; it makes another wait."""
+    """Axes (k, n) and one more, from the first independent direction in `waiting`; `even` times it joins `waiting`."""
     while waiting:
         one = waiting.pop(0)
         length, left = np.linalg.norm(one), one

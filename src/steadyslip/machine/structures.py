@@ -27,16 +27,16 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.machine.structure_data import StructureData, reduced_once
 
 _ONE = "give exactly one of matrices, modes and response"
-_DAMPED = 0.1  # damping ratio from which it is asked about: as percent most are above, as ratios nearly all below
-_FEEDING = 0.2  # share of frequencies at which a structure that loses energy may seem to feed it, by errors
-_SLOW = 0.2  # rad/s: towers and ships sway with .1 to 1 rad/s in the slowest of their modes, not in the fastest
-_SMALL = 1e-8  # share of the largest eigenvalue of a damping matrix that is taken for rounding of a file
+_DAMPED = 0.1  # damping ratios from here on are reported as doubtful: they were probably given in percent
+_FEEDING = 0.2  # share of frequencies at which a passive structure may seem to feed energy, by measurement errors
+_SLOW = 0.2  # rad/s; doubtful if even the fastest mode is slower: the slowest modes of towers and ships have .1 to 1
+_SMALL = 1e-8  # negative eigenvalues of a damping matrix below this share of the largest are rounding of the file
 _UNITS = 'units of length, of mass or force, and of time, as in "mm t s" or "mm N s"'
 
 
 @dataclass(frozen=True)
 class Unread:
-    """Stands in a table for the data of a file that cannot be read."""
+    """Placeholder in a table for data of a file that cannot be read, with the reason."""
 
     reason: str
 
@@ -61,13 +61,13 @@ class OfStructure(Entry):
 
     def written(self, value: Any, area: float | None = None) -> str:
         if not value.source:
-            raise ParameterError([Problem("matrices", "were made in Python; save them to a file and read that first")])
+            raise ParameterError([Problem("matrices", "were made in Python; save them to a file and read it first")])
         return json.dumps(value.source)
 
 
 @dataclass(frozen=True)
 class FileUnits(Entry):
-    """Field type: units of length, of mass or force, and of time, which finite-element programs leave to users."""
+    """Field type: units of length, mass or force, and time of a finite-element file, which does not state them."""
 
     doc: str
 
@@ -83,12 +83,12 @@ class FileUnits(Entry):
 
 
 def unit_sizes(units: Any) -> tuple[float, float, float]:
-    """Units of length, mass and time in m, kg and s, from text such as ``"mm t s"`` or ``"mm N s"``.
+    """Sizes of the units of length, mass and time in m, kg and s, from text such as ``"mm t s"`` or ``"mm N s"``.
 
     Raises
     ------
     ParameterError
-        Naming no field, if it is no such text.
+        If the text is not three such units; the caller adds the name of the field.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def unit_sizes(units: Any) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class Freedom(Entry):
-    """Field type: a degree of freedom of matrices, by its number from 1 or by its name."""
+    """Field type: a degree of freedom of matrices, given by its number from 1 or by its name."""
 
     doc: str
 
@@ -122,14 +122,14 @@ class Freedom(Entry):
         return value if isinstance(value, str) else int(value)
 
     def allowed(self) -> str:
-        return 'a whole number >= 1, or a name that the file has, such as "105.1"'
+        return 'a whole number >= 1, or a name in the file, such as "105.1"'
 
     def schema(self) -> Schema:
         return {"anyOf": [{"type": "integer", "minimum": 1}, {"type": "string"}], "description": self.doc}
 
 
 class StructurePoint(FrozenRecord):
-    """A point of a structure where links and contacts act, with the constant force there.
+    """A point of a structure to which links and contacts can be attached, with a constant force on it.
 
     `x` and `y` are degrees of freedom of the matrices; a structure given by modes names its points in the file.
     """
@@ -189,7 +189,7 @@ class StructureBody(Body, name="structure"):
     is_structure: ClassVar[bool] = True
 
     def moves_across(self, point: str) -> bool:
-        """True if a point has a degree of freedom across its own x, or only one across."""
+        """True if a point has a degree of freedom y, across its x direction, or has no degree of freedom x."""
         own = self.points.get(point)
         given = None if own is None or (own.x, own.y) == (None, None) else (own.x, own.y)
         along, across = given or self._read.points[point]
@@ -200,7 +200,7 @@ class StructureBody(Body, name="structure"):
             yield Problem("matrices", _ONE)
             return
         if self.kept_modes is not None and self.matrices is None:
-            yield Problem("kept_modes", "is of matrices; allowed without them: fewer lines in the table of modes")
+            yield Problem("kept_modes", "is only for matrices; to keep fewer modes, delete lines in the table of modes")
         for name, point in self.points.items():
             known, taken = name in self._read.points, (point.x, point.y) != (None, None)
             if known and taken:
@@ -210,7 +210,7 @@ class StructureBody(Body, name="structure"):
                 hint = f"; the file names {found}" if found else ""
                 yield Problem(f"points.{name}.x", f"missing; give the degree of freedom along x, y or both{hint}")
             if taken and point.x == point.y:
-                message = f"is {repr_short(point.y)}, as x; allowed: another degree of freedom, or none"
+                message = f"is {repr_short(point.y)}, the same as x; allowed: another degree of freedom, or none"
                 yield Problem(f"points.{name}.y", message)
             for axis in ("x", "y"):
                 try:
@@ -224,7 +224,7 @@ class StructureBody(Body, name="structure"):
             yield Problem("kept_modes", f"got {self.kept_modes}; allowed: up to {most}, the other degrees of freedom")
 
     def doubts(self) -> Iterator[str]:
-        """Yield what is unusual about allowed values, in sentences that begin with a name in the body's table."""
+        """Yield a sentence for each allowed but doubtful value; it begins with the key in the body's table."""
         small = "of structures .0001 to .1 are measured, and 2 % is 0.02"
         if self.modal_damping is not None and self.modal_damping >= _DAMPED:
             yield f"modal_damping = {self.modal_damping:g} is a damping ratio; {small}"
@@ -249,25 +249,25 @@ class StructureBody(Body, name="structure"):
                 yield "matrices: the damping C feeds some motions (it has negative eigenvalues): is its sign right?"
             if fastest := self.matrices.fastest_of_slow(_SLOW):
                 yield (
-                    f"matrices: the fastest of all modes turns once in {format_quantity(2 * np.pi / fastest, 's')}, "
-                    "slower than any structure: are M and K exchanged, or the unit of time another?"
+                    f"matrices: the fastest mode has a period of {format_quantity(2 * np.pi / fastest, 's')}, "
+                    "slower than any structure: are M and K exchanged, or is the unit of time wrong?"
                 )
         elif self.response is not None:
             wrong = {name: share for name, share in self.response.feeding().items() if share > _FEEDING}
             if wrong:
                 names, most = " and ".join(f"{name}/{name}" for name in wrong), format_percent(max(wrong.values()))
                 what = f"{names} of {self.response.source!r} would feed energy at up to {most} of the frequencies"
-                why = "are signs, phase and unit right? Motion is as exp(+i omega t), so that a structure lags"
+                why = "are signs, phase and unit right? Motion is as exp(+i omega t), in which a structure lags"
                 yield f"response: {what}: {why}"
 
     @property
     def data(self) -> StructureData:
-        """The matrices, reduced if so told, or those of the modes; of a response what tells where its points are."""
+        """Matrices of the structure, reduced if `kept_modes` is given; dummies with its points for a response."""
         return self._read if self.kept_modes is None else self._reduced[0]
 
     @property
     def reduction_error(self) -> float | None:
-        """Largest relative error of the structure's own frequencies (`reduced`); None if it is not reduced."""
+        """Largest relative error of the natural frequencies by the reduction (`reduced`); None if not reduced."""
         return None if self.kept_modes is None else self._reduced[1]
 
     @property
@@ -276,13 +276,13 @@ class StructureBody(Body, name="structure"):
 
     @property
     def _rows(self) -> tuple[int, ...]:
-        """Rows of the matrices, from 0, that points name, each once."""
+        """Indices (from 0) of the degrees of freedom that points name, without repetition."""
         places = (place for point in self.points.values() for place in (point.x, point.y) if place is not None)
         return tuple(dict.fromkeys(map(self._read.row, places)))
 
     @property
     def _read(self) -> StructureData:
-        """Data as the file has them."""
+        """Data of the file, not reduced; for a response dummy matrices with its points."""
         if self.response is not None:
             one = np.eye(len(self.response.names))
             return StructureData(one, 0 * one, one, 0 * one, self.response.points(), self.response.source)
@@ -292,18 +292,18 @@ class StructureBody(Body, name="structure"):
         return found
 
     def point_names(self) -> tuple[str, ...]:
-        """Names of the points: those of the file, and those given beside it."""
+        """Names of the points in the data file and in the rig file."""
         return tuple(dict.fromkeys((*self.data.points, *self.points)))
 
     def axes(self, name: str) -> tuple[Array | None, Array | None]:
-        """Rows of displacements of a point along the structure's own x and y; None where it does not move."""
+        """Rows (n,) that give the displacements of a point along the structure's own x and y; None where fixed."""
         if name in self.data.points:
             return self.data.points[name]
         point = self.points[name]
         return self._axis(point.x), self._axis(point.y)
 
     def _axis(self, place: int | str | None) -> Array | None:
-        """Row of the displacement that a place names."""
+        """Unit row (n,) that selects a degree of freedom, given by number or name; None for None."""
         if place is None:
             return None
         row, found = self._read.row(place), np.zeros(self.data.size)
@@ -311,7 +311,7 @@ class StructureBody(Body, name="structure"):
         return found
 
     def moves_away(self, name: str) -> bool:
-        """True if a point has a displacement away from the surface."""
+        """True if a point can move away from the surface."""
         return self.axes(name)[1] is not None or bool(self._point(name).angle != 0)
 
     def _point(self, name: str) -> StructurePoint:
@@ -319,13 +319,13 @@ class StructureBody(Body, name="structure"):
         return found
 
     def rows(self, name: str) -> tuple[Array, Array]:
-        """Rows of displacements of a point along the slide, and away from the surface."""
+        """Rows (n,) that give the displacements of a point along the slide and away from the surface."""
         x, y = (np.zeros(self.data.size) if one is None else one for one in self.axes(name))
         angle = float(self._point(name).angle)
         return np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
 
     def forces(self) -> Array:
-        """Constant forces on the degrees of freedom, (n,); of symbols where forces and presses are."""
+        """Constant forces (N) on the degrees of freedom, (n,); symbolic if forces of points are symbols."""
         found = np.zeros(self.data.size)
         for name, point in self.points.items():
             along, away = self.rows(name)
@@ -333,7 +333,7 @@ class StructureBody(Body, name="structure"):
         return found
 
     def damping_matrix(self) -> Array:
-        """Damping with that of modes, and the gyroscopic matrix at the speed of rotation."""
+        """Sum of the damping matrix, the gyroscopic matrix at the speed of rotation, and modal damping; (n, n), SI."""
         found = self.data.damping
         if np.any(self.data.gyroscopic):
             found = found + (1.0 if self.spin is None else float(self.spin)) * self.data.gyroscopic

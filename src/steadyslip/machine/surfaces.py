@@ -1,4 +1,4 @@
-"""Contacts of a machine: two bodies and their friction and contact laws."""
+"""Contacts of a machine: two bodies, with a friction law and a contact law."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ class Surface(FrozenRecord):
 
     @property
     def held(self) -> str:
-        """Body on which friction acts: the one that slides, or that lies on the moving load point (a belt)."""
+        """Body on which friction acts: `body`, or `against` if that lies on the moving load point (a belt)."""
         return self.against if self.body == LOAD_POINT else self.body
 
     @property
     def base(self) -> str:
-        """Counterpart of `held`: body, ground or load point."""
+        """Body, ground or load point on which `held` slides."""
         return self.body if self.body == LOAD_POINT else self.against

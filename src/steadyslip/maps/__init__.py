@@ -1,8 +1,8 @@
 """Maps: analyses of millions of rigs, on this machine or a cluster, stored on disk chunk by chunk.
 
-A `Map` (plan: axes, measures) is computed chunk by chunk (work) by processes here or on a cluster, stored in a Zarr
-group (store) and returned as `MapResult` (view), which is exported, drawn and refined. Independent of figures and
-documents.
+A `Map` (`plan`: axes, measures) is computed chunk by chunk (`work`) by processes on this machine or a cluster, stored
+in a Zarr group (`store`) and returned as a `MapResult` (`view`), which can be exported, drawn and refined. Does not
+import figures or reports.
 """
 
 from __future__ import annotations

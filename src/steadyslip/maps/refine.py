@@ -1,8 +1,8 @@
-"""Refinement of a map along an edge, instead of everywhere.
+"""Refinement of a map only along an edge of a result.
 
-An edge lies between neighbouring grid points that differ (stable or not, say). Cells that it crosses are halved along
-each axis, repeatedly. A cell with equal corners is included as soon as a point on its faces differs, so that an edge is
-followed beyond the cells where it was first seen.
+An edge lies between neighbouring grid points with different results, such as stable and unstable. Cells that the edge
+crosses are halved along each axis, repeatedly. A cell with equal corners is included as soon as a point on its faces
+differs, so that an edge is followed beyond the cells in which it was first found.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from steadyslip.maps.plan.measures import Measure
 from steadyslip.maps.view.map_result import MapResult
 from steadyslip.maps.work.run import run_map
 
-MOST_ROUNDS = 12  # halvings: 4096 points between two of the map; chosen by trial
+MOST_ROUNDS = 12  # largest number of halvings: 4096 steps between two points of the map; chosen by trial
 MOST_AXES = 3  # the number of cells along an edge grows as size^(axes - 1)
 
 
 @dataclass(frozen=True, eq=False)
 class Refined(ReadOnly):
-    """Edge of a map, and the points computed to find it.
+    """Edge of a result of a map, and the points computed to find it.
 
     Attributes
     ----------
@@ -46,17 +46,17 @@ class Refined(ReadOnly):
     of : str
         Name of the result whose edge it is.
     level : float or None
-        Value of the result at the edge; None for a result that is one of several kinds.
+        Value of the result at the edge (SI units); None for a result with kinds, such as ``status``.
     rounds : int
         Number of times that cells were halved.
     points : dict of str to ndarray (m,)
-        New points: parameters that vary and all results, SI units.
+        New points: varied parameters and all results, SI units.
     edge : dict of str to ndarray (n,)
-        Points on the edge: parameters halfway between finest neighbours that differ.
+        Points on the edge: varied parameters halfway between neighbours of the finest grid that differ, SI units.
     sides : ndarray (n, 2)
-        Kinds of `of` on both sides; for numbers, 1 above the level and 0 below.
+        Kinds of the result on both sides of the edge; for numeric results, 1 above the level and 0 below.
     spacing : dict of str to float
-        Largest distance of finest neighbours along each parameter; the edge is known to half of it.
+        Largest spacing of the finest grid along each parameter, SI units; the edge is known to half of it.
     """
 
     map: MapResult
@@ -86,7 +86,7 @@ class Refined(ReadOnly):
         return "\n".join(lines)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the points on the edge as CSV: parameters in SI units, then both sides.
+        """Write the points on the edge as CSV: parameters in SI units, then the kinds on both sides.
 
         Raises
         ------
@@ -122,18 +122,18 @@ def refine(
     Parameters
     ----------
     found : MapResult
-        Complete map over up to three parameters on grids; lists of values are not refined.
+        Complete map over up to three parameters on grids; axes with lists of values are not refined.
     rounds : int
         Number of halvings of the cells at the edge; each needs about as many points as the edge has cells.
     of : str, optional
         Result whose edge is wanted; by default ``status``, or the map's first result.
     level : float, optional
         Value (SI units) of a numeric result at the edge; by default 0 for ``growth_rate`` and ``margin``, 1 for
-        ``safety_factor``. Points without the result count as below.
+        ``safety_factor``. Points without a value count as below.
     compute : sequence of Measure, optional
         Measures to compute; by default those of the map. Required if the map computes functions.
     workers, cluster, progress
-        As in `run_map`. New points are stored beside the map, in a folder with its name and the ending ``.refined``.
+        As in `run_map`. New points are stored next to the map, in a folder with its name and the ending ``.refined``.
 
     Returns
     -------
@@ -186,7 +186,7 @@ def _level(found: MapResult, of: str, level: float | None) -> float | None:
         problems.append(Problem("of", f"{of!r} has several numbers per point; choose another result"))
     elif found.words(of):
         if level is not None:
-            problems.append(Problem("level", f"{of} is one of several kinds; leave the level away"))
+            problems.append(Problem("level", f"{of} has kinds, not numbers; leave the level out"))
     elif level is None:
         usual = {"growth_rate": 0.0, "margin": 0.0, "safety_factor": 1.0}
         if of not in usual:
@@ -202,7 +202,7 @@ def _level(found: MapResult, of: str, level: float | None) -> float | None:
 
 
 class _Sides:
-    """Function from values of a result to the side of the edge, as small integers."""
+    """Function that returns the side of the edge for values of a result: the kind, or 1 above the level, else 0."""
 
     def __init__(self, found: MapResult, of: str, level: float | None) -> None:
         self.level = None if found.words(of) else level
@@ -214,7 +214,7 @@ class _Sides:
 
 
 class _Lattice:
-    """Fine grid with integer coordinates (nodes): `size` steps from one point of the map's grid to the next."""
+    """Finest grid with integer coordinates of its nodes: `size` steps from one point of the map's grid to the next."""
 
     def __init__(self, found: MapResult, rounds: int) -> None:
         over = found.store.definition["over"]
@@ -226,11 +226,11 @@ class _Lattice:
         if not any(self.divides):
             raise NotAvailable("the map has no grid to refine; give a parameter as a grid, with from, to and points")
         if sum(self.divides) > MOST_AXES:
-            raise NotAvailable(f"a map over more than {MOST_AXES} grids cannot be refined; hold one of them")
+            raise NotAvailable(f"a map over more than {MOST_AXES} grids cannot be refined; let fewer parameters vary")
         self.size = 2**rounds
         self.shape = tuple((len(v) - 1) * self.size + 1 for v in self.values)
         if float(np.prod([float(n) for n in self.shape])) > 2.0**62:
-            raise NotAvailable(f"{rounds} rounds are more than can be counted on this map; ask for fewer")
+            raise NotAvailable(f"rounds = {rounds} gives too many points to be numbered on this map; give fewer")
         unit = [1 if d else 0 for d in self.divides]
         self.corners = np.array(list(itertools.product(*((0, u) for u in unit))), dtype=np.int64)
         self.corners = np.unique(self.corners, axis=0)
@@ -238,24 +238,24 @@ class _Lattice:
         self.inside = np.array(list(thirds), dtype=np.int64)
 
     def flat(self, nodes: Array) -> Array:
-        """Nodes (m, n) as flat indices."""
+        """Flat indices (m,) of nodes (m, n)."""
         return np.asarray(np.ravel_multi_index(tuple(np.asarray(nodes).T), self.shape), dtype=np.int64)
 
     def nodes(self, flat: Array) -> Array:
         return np.stack(np.unravel_index(flat, self.shape), axis=-1).astype(np.int64)
 
     def first_cells(self) -> Array:
-        """Lowest corners of all cells of the map's grid."""
+        """Lowest corners (m, n) of all cells of the map's grid, as nodes."""
         counts = [len(v) - 1 if d else len(v) for v, d in zip(self.values, self.divides, strict=True)]
         return np.asarray(np.indices(counts).reshape(len(counts), -1).T * self.size)
 
     def inner(self, cells: Array, step: int) -> Array:
-        """True for cells within the grid."""
+        """Mask (m,) of the cells, given by their lowest corners, that are inside the grid."""
         high = np.array(self.shape) - np.where(self.divides, step, 1)
         return np.asarray(np.all((cells >= 0) & (cells <= high), axis=1))
 
     def parameters(self, nodes: Array) -> dict[str, Array]:
-        """Values (SI units) of the parameters at nodes, which need not be integers."""
+        """Values (SI units) of the parameters at nodes (m, n), which may be fractional, by name."""
         found = {}
         for i, (name, values) in enumerate(zip(self.names, self.values, strict=True)):
             place = nodes[:, i] / self.size
@@ -268,14 +268,14 @@ class _Lattice:
 
     def spacing(self, axis: int) -> float:
         nodes = np.zeros((self.shape[axis], len(self.names)))
-        if self.shape[axis] > 2**20:  # too many to list: the spacing is even
+        if self.shape[axis] > 2**20:  # too many nodes for memory: take the spacing as uniform between map points
             return float(np.max(np.abs(np.diff(self.values[axis]))) / self.size)
         nodes[:, axis] = np.arange(self.shape[axis])
         return float(np.max(np.abs(np.diff(self.parameters(nodes)[self.names[axis]]))))
 
 
 class _KnownNodes:
-    """Nodes whose kind is known, sorted by flat index."""
+    """Nodes whose side of the edge has been computed, sorted by flat index."""
 
     def __init__(self, flat: Array, kinds: Array) -> None:
         order = np.argsort(flat)
@@ -295,7 +295,7 @@ class _KnownNodes:
 
 
 class _Batches:
-    """Computation of new points as maps of their own beside the map, so that it can be interrupted and continued."""
+    """Function that computes new points, as separate maps next to the map so that it can be interrupted."""
 
     def __init__(
         self, found: MapResult, of: str, level: float | None, compute: Sequence[AnyMeasure] | None, lattice: _Lattice,
@@ -336,7 +336,7 @@ def _measures_of(definition: dict[str, Any]) -> tuple[Any, ...]:
     found = []
     for name, options in definition.items():
         if "function" in options:
-            message = f"the map computes the function {name!r}, which is not kept with it; give compute=[...]"
+            message = f"the map computes the function {name!r}, which is not stored with it; give compute=[...]"
             raise NotAvailable(message)
         law = find_law(Measure, name)
         found.append(law(**{key: value for key, value in options.items() if key not in ("name", "text")}))
@@ -344,15 +344,16 @@ def _measures_of(definition: dict[str, Any]) -> tuple[Any, ...]:
 
 
 def _is_mixed(lattice: _Lattice, known: _KnownNodes, cells: Array, step: int) -> Array:
-    """True for cells (given by their lowest corners) whose corners differ in kind."""
+    """Mask of the cells (given by their lowest corners) whose corners are on different sides of the edge."""
     corners = cells[:, None, :] + step * lattice.corners
     kinds = known.of(lattice.flat(corners.reshape(-1, corners.shape[-1]))).reshape(len(cells), -1)
     return np.asarray(np.any(kinds != kinds[:, :1], axis=1))
 
 
 def _divided(lattice: _Lattice, known: _KnownNodes, cells: Array, step: int, compute: Any) -> Array:
-    """Halve cells of size 2 step at the edge, and others that it turns out to cross; returns halves with mixed
-    corners.
+    """Lowest corners of cells of size `step` with mixed corners, by halving cells of size 2 `step` at the edge.
+
+    Neighbouring cells that the edge turns out to cross are halved as well.
     """
     active = np.unique(lattice.flat(cells))
     waiting = active
@@ -383,7 +384,7 @@ def _divided(lattice: _Lattice, known: _KnownNodes, cells: Array, step: int, com
 
 
 def _edge(lattice: _Lattice, known: _KnownNodes, cells: Array) -> tuple[dict[str, Array], Array]:
-    """Points halfway between finest neighbours that differ, and their kinds."""
+    """Parameters (SI units, by name) halfway between neighbouring nodes that differ, and sides of the edge (n, 2)."""
     places, sides = [], []
     for axis in np.flatnonzero(lattice.divides):
         along = np.zeros(len(lattice.names), dtype=np.int64)

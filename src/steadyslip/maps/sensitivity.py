@@ -19,13 +19,13 @@ from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import Samples
 from steadyslip.maps.plan.map import Map, evaluate
 
-POINTS = 4096  # default number of sets of points: chosen by trial against time
-RESAMPLES = 200  # of the bootstrap; chosen by trial against time
+POINTS = 4096  # default number of sets of points; chosen by trial, accuracy against time
+RESAMPLES = 200  # number of bootstrap samples; chosen by trial, accuracy against time
 BLOCK = 32  # sets of points evaluated together, between checks for Ctrl-C; chosen by trial
-LEAST, MOST = 64, 2**20  # sets of points; chosen by trial: fewer give intervals as wide as the range of an index
-ROUNDING = 1e-10  # relative range of a result up to which it counts as constant: a million roundings
-WIDE = 0.2  # width of an interval of an index (0 to 1) from which the summary warns
-LEVEL = 0.95  # of confidence
+LEAST, MOST = 64, 2**20  # allowed sets of points; chosen by trial: fewer give intervals as wide as an index's range
+ROUNDING = 1e-10  # a result with a smaller relative range counts as constant: a million rounding errors
+WIDE = 0.2  # the summary warns if the interval of an index (0 to 1) is wider
+LEVEL = 0.95  # confidence level of the intervals
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,17 +39,17 @@ class Sensitivity(ReadOnly):
     ranges : dict of str to (float, float, str)
         Ends in SI units, and spacing ``linear`` or ``log``.
     first, total : dict of str to ndarray (d,)
-        By result: share of each parameter alone, and together with its interactions.
+        By result: share of the variance due to each parameter alone, and together with its interactions.
     first_interval, total_interval : dict of str to ndarray (2, d)
-        95 % bootstrap intervals.
+        95 % bootstrap intervals of the shares.
     missing : dict of str to float
-        Share of the points without the result; they are left out, and the indices are those over the rest.
+        By result: share of the points without a value; their sets are left out of the indices.
     points : dict of str to int
         Number of sets of points used, each of d + 2 evaluations.
     interrupted : bool
         True if Ctrl-C came before all sets were done.
     without : dict of str to str
-        Results without indices, and why: too few points with a value, or no variation.
+        Results without indices, with the reason: too few points with a value, or no variation.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -180,9 +180,7 @@ def sensitivity(
     if not (whole and LEAST <= points <= MOST and points & (points - 1) == 0):
         raise ParameterError([Problem("points", f"got {points!r}; allowed: a power of 2, from {LEAST} to {MOST}")])
     if rig.holds:
-        raise NotAvailable(
-            "shares of variance are of steady sliding, and the drive holds a place; compute a map instead"
-        )
+        raise NotAvailable("shares of variance need steady sliding, but the drive holds a place; compute a map instead")
     plan = Map(
         rig,
         compute=default_results(rig) if of is None else of,
@@ -194,7 +192,7 @@ def sensitivity(
     outputs = plan.outputs()
     several = [output.name for output in outputs if output.flags or output.extra]
     if several:
-        raise ParameterError([Problem("of", f"{name!r} is not one number a point") for name in several])
+        raise ParameterError([Problem("of", f"{name!r} is not one number per point") for name in several])
     sets = _sets(plan, points, seed)
     values = _evaluated(plan, sets, progress)  # (d + 2, points) each
     asked, points = points, next(iter(values.values())).shape[1]
@@ -231,12 +229,12 @@ def sensitivity(
 
 
 def default_results(rig: Slider | Machine) -> tuple[str, ...]:
-    """Default results for a rig."""
+    """Names of the results that are analysed by default for a rig."""
     return ("critical_stiffness", "margin") if rig.default_along else ("growth_rate",)
 
 
 def _evaluated(plan: Map, sets: dict[str, Array], progress: bool | None) -> dict[str, Array]:
-    """All results at all sets (d + 2, points), or at those finished when Ctrl-C came."""
+    """Results by name, each (d + 2, sets); only the sets finished before Ctrl-C if that is pressed."""
     count = next(iter(sets.values())).shape[1]
     parts: list[dict[str, Array]] = []
     with (
@@ -255,7 +253,7 @@ def _evaluated(plan: Map, sets: dict[str, Array], progress: bool | None) -> dict
 
 
 def _sets(plan: Map, points: int, seed: int) -> dict[str, Array]:
-    """Parameters at points A, B, and A with one parameter from B, shape (d + 2, points) each."""
+    """Values of each parameter at points A, at B, and at A with one parameter from B; (d + 2, points) by name."""
     from scipy.stats import qmc
 
     ranges = plan.sampling.ranges  # type: ignore[union-attr]
@@ -272,7 +270,7 @@ def _sets(plan: Map, points: int, seed: int) -> dict[str, Array]:
 
 
 def _indices(column: Array) -> Array:
-    """First-order and total indices, (2, d), from a result at all sets, (d + 2, n)."""
+    """First-order and total indices (2, d) from a result's values (d + 2, n), ordered as by `_sets`."""
     from scipy.stats import sobol_indices
 
     parts = {"f_A": column[:1], "f_B": column[1:2], "f_AB": column[2:, None, :]}

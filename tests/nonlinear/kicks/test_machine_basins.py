@@ -51,7 +51,7 @@ def test_without_mass_the_memory_of_its_contact_is_beside_the_place_of_a_body():
 def test_planes_that_cannot_be_are_refused():
     with pytest.raises(ss.ParameterError, match="did you mean 'table'"):
         ss.basin(two_mass(), at="tabel")
-    with pytest.raises(ss.ParameterError, match="one block, leave it out"):
+    with pytest.raises(ss.ParameterError, match="one block without a name; leave the argument out"):
         ss.basin(same_block(7)[0], at="block")
 
 

@@ -143,7 +143,7 @@ def test_where_a_kick_acts_has_to_be_said(kick, at, words):
 def test_kicks_that_cannot_be_are_refused():
     with pytest.raises(ss.NotAvailable, match="dashpot"):
         ss.threshold(two_mass(kp=4.0), "displacement")
-    with pytest.raises(ss.ParameterError, match="leave it out"):
+    with pytest.raises(ss.ParameterError, match="leave the argument out"):
         ss.threshold(pair(7)[0], at="block")
     with pytest.raises(ss.ParameterError, match="'table' has no mass"):
         ss.threshold(weak(), "velocity", at="table")

@@ -1,1 +1,1 @@
-"""What a map is: measures, over which parameters, in which chunks. Computes nothing, touches no disk."""
+"""Definition of a map: measures, varied parameters, chunks. Does no map computation and writes no files."""

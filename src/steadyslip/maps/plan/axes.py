@@ -1,4 +1,4 @@
-"""Values of the varied parameters: grids and lists as axes, samples along one common dimension."""
+"""Values of a map's varied parameters: axes (grids or lists), and samples along one common dimension."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from steadyslip.core.roles import Parameter
 SPACINGS = ("linear", "log")
 SAMPLERS = ("sobol", "latin-hypercube")
 SAMPLE = "sample"
-COMPLETE = "complete"  # name of the array of chunk checksums ("marks")
-MOST_POINTS = 10**12  # of a map: results of 8 bytes then have 8 TB
+COMPLETE = "complete"  # name of the array of chunk checksums in a stored map
+MOST_POINTS = 10**12  # largest number of points of a map: results of 8 bytes then have 8 TB
 SOBOL_BITS = 32  # largest resolution at which SciPy's fast_forward works
-LARGEST_HYPERCUBE = 2**22  # points; all are generated to get one of them, 34 MB per parameter
+LARGEST_HYPERCUBE = 2**22  # points; all are generated even if one is needed, 34 MB per parameter
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Grid(Displayed):
     start, stop : float or str
         SI units, or text with a unit such as ``"10 deg"``.
     points : int
-        At least 1; one point is `start`.
+        At least 1; a single point is at `start`.
     spacing : str
         ``linear``, or ``log`` for even spacing of the logarithm.
     """
@@ -47,12 +47,12 @@ class Grid(Displayed):
 
 @dataclass(frozen=True)
 class Samples(Displayed):
-    """Points spread over ranges of several parameters, along one dimension of the map.
+    """Random points in ranges of several parameters, along one dimension of the map.
 
     Parameters
     ----------
     over : mapping of str to (low, high) or (low, high, "log")
-        Ranges by dotted name, SI units or text; uniform in the value or in its logarithm.
+        Ranges by dotted name, in SI units or as text with a unit; points are uniform in the value or its logarithm.
     points : int
         A power of 2 suits Sobol points best.
     method : str
@@ -68,7 +68,7 @@ class Samples(Displayed):
 
 @dataclass(frozen=True, eq=False)
 class Axis(ReadOnly):
-    """Values of one parameter along a dimension of its own."""
+    """Values (SI units) of one parameter, which has a dimension of its own."""
 
     name: str
     role: Parameter
@@ -84,7 +84,7 @@ class Axis(ReadOnly):
 
 @dataclass(frozen=True)
 class Generated:
-    """Sample points that follow from a seed, computed in parts.
+    """Sample points that are generated from a seed, part by part.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Generated:
         return tuple(name for name, *_ in self.ranges)
 
     def part(self, start: int, stop: int) -> dict[str, Array]:
-        """Parameters of the points from `start` to `stop`."""
+        """Parameter values (SI units) at the points from index `start` to before `stop`, by name."""
         unit = _sobol(self).part(start, stop) if self.method == "sobol" else _hypercube(self)[start:stop]
         found = {}
         for column, (name, low, high, spacing) in zip(unit.T, self.ranges, strict=True):
@@ -116,7 +116,7 @@ class Generated:
 
 
 class _Sobol:
-    """Sobol sequence that continues from its position, and restarts only to go back."""
+    """Sobol sequence that continues from its last position; restarts only if an earlier part is requested."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
         self.dimensions, self.seed = dimensions, seed
@@ -134,7 +134,7 @@ class _Sobol:
             self._restart()
         if start > self.position:
             self.engine.fast_forward(start - self.position)
-        with warnings.catch_warnings():  # SciPy warns if a part's length is no power of 2; only the whole should be
+        with warnings.catch_warnings():  # SciPy warns if the length is no power of 2, which is needless for a part
             warnings.simplefilter("ignore", UserWarning)
             found = self.engine.random(stop - start)
         self.position = stop
@@ -161,7 +161,7 @@ class Listed(ReadOnly):
     ----------
     values : dict of str to ndarray (m,)
     source : str
-        Origin of the points, for messages.
+        Origin of the points, for the map's definition.
     """
 
     values: dict[str, Array] = field(repr=False)
@@ -176,7 +176,7 @@ class Listed(ReadOnly):
         return len(next(iter(self.values.values())))
 
     def part(self, start: int, stop: int) -> dict[str, Array]:
-        """Parameters of the points from `start` to `stop`."""
+        """Parameter values (SI units) at the points from index `start` to before `stop`, by name."""
         return {name: column[start:stop] for name, column in self.values.items()}
 
     def definition(self) -> dict[str, Any]:
@@ -188,7 +188,7 @@ Sampling = Generated | Listed
 
 
 def digest(values: Array) -> str:
-    """Short hash of the exact numbers of an array."""
+    """SHA-256 of the exact numbers of an array, first 16 hexadecimal digits."""
     return hashlib.sha256(np.ascontiguousarray(values, dtype="<f8").tobytes()).hexdigest()[:16]
 
 
@@ -198,7 +198,7 @@ def make_axis(name: str, role: Parameter, given: Any) -> Axis:
     Raises
     ------
     ParameterError
-        With the parameter and what is wrong.
+        If the range or a value is not allowed.
     """
     if isinstance(given, Grid):
         low, high = _ends(name, role, given.start, given.stop, given.spacing)
@@ -218,7 +218,7 @@ def make_axis(name: str, role: Parameter, given: Any) -> Axis:
     if not len(given):
         problems.append(Problem(name, "got an empty list; give at least one value"))
     elif not problems and len(set(numbers)) < len(numbers):
-        problems.append(Problem(name, "a value comes twice; give each once"))
+        problems.append(Problem(name, "has a value twice; give each value once"))
     if problems:
         raise ParameterError(problems[:3])
     return Axis(name, role, np.array(numbers), "list")
@@ -242,9 +242,7 @@ def make_sampling(given: Any, roles: Mapping[str, Parameter]) -> Sampling:
             columns[name] = np.atleast_1d(np.asarray(checked_array(name, roles[name], values), dtype=float))
             if columns[name].ndim != 1:
                 problems.append(
-                    Problem(
-                        f"map.samples.over.{name}", f"got an array of {columns[name].ndim} dimensions; allowed: one"
-                    )
+                    Problem(f"map.samples.over.{name}", f"got an array of {columns[name].ndim} dimensions; allowed: 1")
                 )
         except ParameterError as error:
             problems += (p.under("map.samples.over") for p in error.problems)
@@ -274,7 +272,7 @@ def _generated(given: Samples, roles: Mapping[str, Parameter]) -> Generated:
     for name, ends in given.over.items():
         try:
             if not isinstance(ends, (list, tuple)) or len(ends) not in (2, 3):
-                raise ParameterError([Problem(name, f"got {ends!r}; allowed: two ends, and 'log' if so wanted")])
+                raise ParameterError([Problem(name, f"got {ends!r}; allowed: (low, high) or (low, high, 'log')")])
             spacing = ends[2] if len(ends) == 3 else "linear"
             ranges.append((name, *_ends(name, roles[name], ends[0], ends[1], spacing), spacing))
         except ParameterError as error:

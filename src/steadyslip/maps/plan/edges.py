@@ -24,16 +24,16 @@ from steadyslip.protocol import Protocol
 
 
 def _of_sliders(rig: Slider | Machine) -> Iterator[Problem]:
-    """Problem of a machine for measures about the stiffness k of a slider."""
+    """Yield a Problem if the rig is a machine, for measures of the one stiffness of a slider."""
     if rig.default_along is None:
         yield Problem(
-            "", "is about the one stiffness of a slider, and a machine has several; compute 'edge' or 'stable_values' "
-            "with along = 'links.NAME.stiffness', a gain, or any other parameter",
+            "", "is only for sliders, which have one stiffness; for machines compute 'edge' or 'stable_values' with "
+            "along = 'links.NAME.stiffness', a gain, or any other parameter",
         )  # fmt: skip
 
 
 class CriticalStiffness(Measure, name="critical_stiffness"):
-    """Edge of the stable set nearest to the rig's own stiffness, of sliders; see `steadyslip.critical_stiffness`."""
+    """Stability edge nearest to the rig's own stiffness, for sliders; see `steadyslip.critical_stiffness`."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (Output("critical_stiffness", "Pa/m", "critical stiffness", missing=NO_EDGE),)
@@ -46,7 +46,7 @@ class CriticalStiffness(Measure, name="critical_stiffness"):
 
 
 class StableStiffness(Measure, name="stable_stiffness"):
-    """All stable stiffnesses as intervals, of sliders; see `steadyslip.stable_stiffness`."""
+    """All stable stiffnesses as intervals, for sliders; see `steadyslip.stable_stiffness`."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         values = operating_point(rig, None, [n for n in varied if n in rig.parameters()])
@@ -63,11 +63,11 @@ class StableStiffness(Measure, name="stable_stiffness"):
         yield from _of_sliders(rig)
 
 
-ALONG = "dotted name of the parameter that is meant, which must enter the equations linearly: a stiffness, a gain, ..."
+ALONG = "dotted name of the parameter, which must enter the equations linearly: a stiffness, a gain, ..."
 
 
 class Along(Measure):
-    """Base of measures about the stability boundary along one parameter that enters the equations linearly."""
+    """Base of measures of the stability boundary along one parameter that enters the equations linearly."""
 
     along: str | None = setting(Text(ALONG), default=None)
 
@@ -92,25 +92,25 @@ class Along(Measure):
             yield Problem("along", str(error))
 
     def unit(self, rig: Slider | Machine) -> tuple[float, str]:
-        """Factor and unit of the results: the unit of the model, or totals for a contact of a machine with an area."""
+        """Factor from SI values of the model to results, and unit of the results: totals for a machine's contact."""
         full = self.name_of(rig)
         return outside(rig.parameters()[full].role.unit, None if rig.area else rig.area_of(full))
 
     def room(self, rig: Slider | Machine, varied: Sequence[str]) -> int:
-        """Largest possible number of intervals."""
+        """Largest possible number of stable intervals at a point."""
         return most_values(operating_point(rig, None, [n for n in varied if n in rig.parameters()]))
 
     def intervals(self, rig: Slider | Machine, vary: Vary) -> Any:
-        """Stable intervals in SI units, (..., m, 2)."""
+        """Low and high ends of the stable intervals, SI units, (..., m, 2)."""
         return intervals_along(rig, self.name_of(rig), vary)
 
     def edge(self, rig: Slider | Machine, vary: Vary) -> tuple[Any, Any]:
-        """Nearest end of a stable interval, and the rig's own value, SI units."""
+        """End of a stable interval nearest to the rig's own value, and that value, SI units."""
         return edge_along(rig, self.name_of(rig), vary)
 
 
 class Edge(Along, name="edge"):
-    """Edge of the stable set of any parameter nearest to its own value, exactly; see `steadyslip.stable_values`."""
+    """Exact stability edge of any parameter, nearest to the rig's value of it; see `steadyslip.stable_values`."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (Output("edge", self.unit(rig)[1], f"edge of stability in {self.name_of(rig)}", missing=NO_EDGE),)
@@ -120,7 +120,7 @@ class Edge(Along, name="edge"):
 
 
 class StableValues(Along, name="stable_values"):
-    """All stable values of any parameter as intervals, exactly; see `steadyslip.stable_values`."""
+    """All stable values of any parameter as exact intervals; see `steadyslip.stable_values`."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         extra = (("interval", self.room(rig, varied)), ("end", 2))

@@ -1,4 +1,4 @@
-"""Measure of rigs that hold a place: whether they hunt about their target or settle, by simulation of each."""
+"""Measure for rigs that hold a place: a simulation of each rig decides if it hunts about its target or settles."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from steadyslip.nonlinear.hunting.plant import plant_of
 from steadyslip.protocol import Protocol
 
 SETTLES, HUNTS, RUNS_AWAY, UNDECIDED = range(4)
-SECONDS_OF_HUNTING = 0.5  # CPU time of a motion, measured: 0.1 to 4 s; only sets the size of chunks
+SECONDS_OF_HUNTING = 0.5  # CPU time of one simulation (s); measured: 0.1 to 4 s; only sets the size of chunks
 
 
 class Hunting(Measure, name="hunt"):
-    """Whether an axis that holds a place hunts about its target or settles; see `steadyslip.hunt`."""
+    """Outcome for an axis that holds a place: settles or hunts, with amplitude and times; see `steadyslip.hunt`."""
 
     moves = True
     held: ClassVar[bool | None] = True
@@ -50,12 +50,12 @@ class Hunting(Measure, name="hunt"):
         return {name: found[:, i].reshape(shape) for i, name in enumerate(own)}
 
     def _at(self, rig: Slider | Machine, protocol: Protocol, values: dict[str, float]) -> tuple[float, ...]:
-        """Outputs at one point."""
+        """Values of all outputs at one point, in their order."""
         moved = {name: value for name, value in values.items() if name.startswith("protocol.")}
         own = rig.with_values({name: value for name, value in values.items() if name not in moved})
         try:
             return _numbers(hunt(own, replaced(protocol, moved, "protocol."), until=self.until, rtol=self.rtol))
-        except NotAvailable:  # too many switches at once, steps too short: what `problems` cannot know
+        except NotAvailable:  # found only during simulation: too many switches at once, or steps too short
             return (UNDECIDED, np.nan, np.nan, np.nan, np.nan)
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
@@ -71,7 +71,7 @@ class Hunting(Measure, name="hunt"):
 
 
 def _numbers(found: Hunt) -> tuple[float, ...]:
-    """Values of the outputs."""
+    """Values of all outputs for the result of a simulation, in their order."""
     reach = max(abs(found.lowest), abs(found.highest))
     if found.hunts is None:
         return (UNDECIDED, np.nan, np.nan, np.nan, np.nan)

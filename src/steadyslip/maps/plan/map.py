@@ -40,12 +40,12 @@ from steadyslip.maps.plan.measures import PROBES, FunctionMeasure, Measure, Outp
 from steadyslip.model.point import operating_point
 from steadyslip.protocol import Protocol
 
-SECONDS = 0.5  # CPU time of a chunk: long beside the cost of handing it out, short enough to lose
+SECONDS = 0.5  # CPU time of a chunk (s): long compared with distributing it, short enough to be lost
 LARGEST_CHUNK = 2**20  # points; bounds a worker's memory (8 MiB per result)
 LEAST_CHUNKS = 32  # so that all workers are busy until the end; chosen by trial
 SHORT = 0.2  # s of CPU time; LEAST_CHUNKS does not make chunks shorter than this; chosen by trial
 MOST_AXIS = 10**7  # values along one axis, which is kept in memory (80 MB)
-MOST_CHUNKS = 2 * 10**6  # each is a few files; chosen by trial, for the sake of file systems
+MOST_CHUNKS = 2 * 10**6  # each has a few files; chosen by trial so that file systems cope
 
 AnyMeasure = Measure | FunctionMeasure
 
@@ -145,7 +145,7 @@ class Map(Displayed):
             problems += error.problems
 
     def _extremes(self, name: str) -> list[dict[str, Any]]:
-        """Values of a sampled parameter that include its smallest and largest."""
+        """Smallest and largest value of a sampled parameter, each as a dict with its name."""
         if isinstance(self.sampling, Generated):
             return [{n: end} for n, low, high, _ in self.sampling.ranges for end in (low, high) if n == name]
         if self.sampling is None:
@@ -177,7 +177,7 @@ class Map(Displayed):
             problems += (p.under("map.over") for p in self._allowed_together())
 
     def _allowed_together(self) -> tuple[Problem, ...]:
-        """Problems of the rig at the corners of the map, where several axes are at their ends."""
+        """Problems of the rigs at the corners of the map, where all axes are at an end."""
         known = self.rig.parameters()
         axes = [a for a in self.axes if a.name in known and not known[a.name].role.adds_state]
         corners = np.meshgrid(*(a.values[[0, -1]] for a in axes), indexing="ij", sparse=True)
@@ -188,21 +188,21 @@ class Map(Displayed):
         return ()
 
     def _build(self, vary: Mapping[str, np.ndarray], scan: bool = False) -> None:
-        """Raise the errors of rigs with these values."""
+        """Build the rigs with these values, to raise the errors that they have."""
         if not self.rig.holds:
             operating_point(self.rig, vary, scan=scan)
             return
         for values in zip(*(a.reshape(-1) for a in np.broadcast_arrays(*vary.values())), strict=True):
             if not self.rig.with_values(dict(zip(vary, map(float, values), strict=True))).holds:
-                message = "cannot be varied: the rig of this map holds a place, so that its velocity is 0"
+                message = "cannot be varied: the rig of this map holds a place, so that its velocity must be 0"
                 raise ParameterError([Problem("drive.velocity", message)])
 
     def known(self) -> dict[str, Address]:
-        """All parameters that may vary, by full name."""
+        """All parameters of rig and protocol that may vary, by full name."""
         return self.rig.parameters() | protocol_parameters(self.rig, self.protocol)
 
     def _resolved(self, given: Mapping[str, Any], place: str, problems: list[Problem]) -> dict[str, Any]:
-        """Values by full name; unknown and repeated names are added to the problems."""
+        """Given values by full name; unknown and repeated names are added to `problems`."""
         found: dict[str, Any] = {}
         if not isinstance(given, Mapping):
             problems.append(Problem(place, f"got {given!r}; allowed: names and their values"))
@@ -220,7 +220,7 @@ class Map(Displayed):
         return found
 
     def _per_area(self, name: str, given: Any) -> Any:
-        """Values with their texts converted as `Rig.read` does: totals of a contact with an area, the axis's speed."""
+        """Values of a parameter with texts converted to SI by `Rig.read`, such as totals of a contact with an area."""
         if name.startswith("protocol."):
             return given
         if isinstance(given, Grid):
@@ -230,18 +230,18 @@ class Map(Displayed):
         return given
 
     def _end(self, name: str, which: str, given: Any) -> Any:
-        """An end of a grid as `Rig.read` reads it; problems name it ``from`` or ``to``."""
+        """SI value of an end of a grid by `Rig.read`; problems name it ``from`` or ``to`` (`which`)."""
         try:
             return self.rig.read(name, given)
         except ParameterError as error:
             raise ParameterError([Problem(f"{one.name}.{which}", one.message) for one in error.problems]) from error
 
     def _allowed(self, name: str, values: Any) -> tuple[Problem, ...]:
-        """Problems of varying a parameter through these values."""
+        """Problems that arise if a parameter takes these values."""
         if name.startswith("protocol."):
             if any(one.moves for one in self.compute):
                 return ()
-            return (Problem(name, "varies, but nothing that is computed simulates the protocol; add 'events'"),)
+            return (Problem(name, "varies, but no measure simulates the protocol; add 'events' to compute"),)
         role = self.known()[name].role
         if any(one.moves for one in self.compute) and role.adds_state:
             return ()  # cases with and without the state are simulated as separate groups
@@ -275,13 +275,13 @@ class Map(Displayed):
         return math.prod(self.shape)
 
     def outputs(self) -> tuple[Output, ...]:
-        """Declarations of all arrays of the map."""
+        """Declarations of all result arrays of the map."""
         varied = [n for n in self.varied if n in self.rig.parameters()]
         return tuple(output for one in self.compute for output in one.outputs(self.rig, varied))
 
     @cached_property
     def chunks(self) -> tuple[int, ...]:
-        """Number of points of a chunk along each dimension: whole last dimensions, and a part of the one before."""
+        """Points of a chunk along each dimension: all along the last ones, a part along the one before, then 1."""
         target = self.chunk or self._suited_chunk()
         found: list[int] = []
         for size in reversed(self.shape):
@@ -293,19 +293,19 @@ class Map(Displayed):
 
     @cached_property
     def seconds(self) -> float:
-        """CPU time per point, s, estimated."""
+        """Estimated CPU time per point, s."""
         probes = self.probes()
         return float(sum(one.seconds(self.rig, self.protocol, _relevant(one, probes)) for one in self.compute))
 
     def _suited_chunk(self) -> int:
-        """Points that take about half a second."""
+        """Number of points per chunk that takes about `SECONDS`, within the limits of chunk size and number."""
         seconds = self.seconds
         points = min(SECONDS / seconds, LARGEST_CHUNK)
-        least = -(-2 * self.size // MOST_CHUNKS)  # the last chunk of a row may be a small one
+        least = -(-2 * self.size // MOST_CHUNKS)  # twice as many chunks as needed: the last of a row may be small
         return max(1, int(max(min(points, self.size / LEAST_CHUNKS), min(points, SHORT / seconds))), least)
 
     def probes(self) -> dict[str, Any]:
-        """Parameters at some random points of the map, always the same."""
+        """Parameter values (SI units) at up to `PROBES` random points of the map; reproducible, by name."""
         generator = np.random.default_rng(0)
         count = min(PROBES, self.size)
         found = {axis.name: generator.choice(axis.values, count) for axis in self.axes}
@@ -316,7 +316,7 @@ class Map(Displayed):
         return found
 
     def definition(self) -> dict[str, Any]:
-        """JSON-ready dict that identifies the map."""
+        """JSON-ready dict with everything that the results of the map depend on."""
         return {
             "rig": rig_definition(self.rig, self.protocol),
             "compute": {one.name: one.definition() for one in self.compute},
@@ -333,24 +333,24 @@ class Map(Displayed):
 
 
 def default_measures(rig: Rig) -> tuple[str, ...]:
-    """Default measures for a rig."""
+    """Names of the measures that are computed for a rig by default."""
     if rig.holds:
         return ("hunt",)
     return ("status", "critical_stiffness" if rig.default_along else "growth_rate")
 
 
 def _unfit(one: AnyMeasure, rig: Rig) -> list[Problem]:
-    """Problem of a measure of steady sliding for a rig that holds a place, or the reverse, as a list."""
+    """List with a Problem if a measure of steady sliding is computed for a rig that holds a place, or the reverse."""
     if one.held is None or one.held == rig.holds:
         return []
     if one.held:
-        return [Problem("", "is of a drive that holds a place: a controller at drive.velocity = 0")]
-    message = "is of steady sliding, and the drive holds a place (velocity = 0); compute 'hunt', or a function of a rig"
+        return [Problem("", "is only for a drive that holds a place: a controller with drive.velocity = 0")]
+    message = "needs steady sliding, but the drive holds a place (velocity = 0); compute 'hunt', or a function of a rig"
     return [Problem("", message)]
 
 
 def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, Address]:
-    """Parameters of a protocol by dotted name, in the units used for this rig; motions are the drive's."""
+    """Parameters of a protocol by dotted name, in the SI units for this rig; motions are those of the drive."""
     reader = TableReader()
     with reader.of_rig(rig):
         reader.feed = 1.0, rig.drive.turns
@@ -361,14 +361,14 @@ def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, 
 
 
 def _relevant(one: AnyMeasure, vary: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters that affect a measure: those of the protocol only if it simulates."""
+    """Varied parameters that affect a measure: those of the protocol only if the measure simulates."""
     return {name: a for name, a in vary.items() if one.moves or not name.startswith("protocol.")}
 
 
 def evaluate(
     rig: Slider | Machine, protocol: Protocol, compute: Iterable[AnyMeasure], vary: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Arrays of all measures at broadcastable points, shape (..., extra) each."""
+    """Result arrays of all measures by name, each (..., extra), for parameter arrays that broadcast to (...)."""
     shape = np.broadcast_shapes(*(np.shape(a) for a in vary.values()))
     results: dict[str, Any] = {}
     for one in compute:
@@ -419,14 +419,14 @@ def _fit_draws(rig: Slider | Machine, given: Any) -> tuple[Slider, dict[str, Any
         message = f"got {given!r}; allowed: Samples, names and their values, a Fit, Draws of one, or a Population"
         raise ParameterError([Problem("map.samples", message)])
     if not isinstance(rig, Slider):
-        message = "a fit is of one block's friction; of a machine, give values for the parameters of a contact by name"
+        message = "a fit has friction of one block; for a machine, give values for the parameters of a contact by name"
         raise ParameterError([Problem("map.samples", message)])
     target, _, vary = transferred(rig, given)
     return target, dict(vary)
 
 
 def rig_definition(rig: Slider | Machine, protocol: Protocol) -> dict[str, Any]:
-    """JSON-ready dict that identifies rig and protocol; laws of other packages by hash of their source."""
+    """JSON-ready dict of rig and protocol; laws from outside this package are represented by a hash of their source."""
     foreign = {
         type(record).__qualname__: source_digest(type(record))
         for record in (*_records(rig), *_records(protocol))
@@ -465,6 +465,6 @@ def _plain(value: Any) -> str:
 
 
 def roles(plan: Map) -> dict[str, Parameter]:
-    """Declarations (unit, meaning) of all parameters that vary."""
+    """Role (unit, meaning) of each parameter that varies, by full name."""
     known = plan.known()
     return {name: known[name].role for name in plan.varied}

@@ -1,4 +1,4 @@
-"""The table ``[map]`` of a rig file: its options, and reading it as a `Map` with all problems reported together."""
+"""Table ``[map]`` of a rig file: its options, and a reader that makes a `Map` and reports all problems together."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class RangeSettings(Settings):
 class GridSettings(RangeSettings):
     """Evenly spaced values of a parameter, both ends included."""
 
-    points: int = setting(Whole("how many", 1, MOST_POINTS))
+    points: int = setting(Whole("number of values", 1, MOST_POINTS))
 
     def grid(self) -> Grid:
         return Grid(self.start, self.stop, self.points or 1, self.spacing)
@@ -69,7 +69,7 @@ class SampleSettings(Settings):
             return
         for key in ("over", "method"):
             if getattr(self, key) is not None:
-                yield Problem(key, "is for samples of ranges; a fit says itself what varies, and how")
+                yield Problem(key, "is only for samples of ranges; a fit determines what varies, and how; leave it out")
 
     def samples(self) -> Samples:
         ranges = {name: (one.start, one.stop, one.spacing) for name, one in (self.over or {}).items()}
@@ -99,10 +99,10 @@ class MapSettings(Settings):
     def inconsistencies(self) -> Iterator[Problem]:
         for one in self.options:
             if one.name not in (self.compute or ()):
-                yield Problem(one.name, f"options of something that is not computed; add {one.name!r} to map.compute")
+                yield Problem(one.name, f"has options but is not computed; add {one.name!r} to map.compute")
 
     def measures(self) -> list[Any] | None:
-        """Measures to compute, as records where they have options, else by name; None if the file does not choose."""
+        """Measures to compute, as records if they have options, else by name; None if the file has no `compute`."""
         if self.compute is None:
             return None
         with_options = {one.name: one for one in self.options}
@@ -121,7 +121,7 @@ def read_map(path: str | PathLike[str], changes: Iterable[str] = ()) -> Map:
     Parameters
     ----------
     path : path
-        TOML file; a path of a fit in it is relative to its folder.
+        TOML file; paths of fits in it are relative to its folder.
     changes : iterable of str
         Values that replace or add to those of the file, as ``"map.over.contact.angle.points=200"``.
 
@@ -165,7 +165,7 @@ def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), f
 
 
 class _MapReader:
-    """Translation of a table to a map for the rig of its file, with the problems that depend on the rig."""
+    """Converter of a table [map] to a Map (`found`) for the file's rig; collects problems that depend on the rig."""
 
     def __init__(self, spec: RigFileContents, settings: MapSettings, folder: Path) -> None:
         self.problems: list[Problem] = []
@@ -188,7 +188,7 @@ class _MapReader:
             self.problems += error.problems
 
     def placed(self) -> list[Problem]:
-        """Problems with the line numbers of their keys, which may be shortened names in the file."""
+        """Problems with the line numbers of their keys in the file, where names may be shortened."""
         return [Problem(p.name, p.message, p.line or self._line(p.name)) for p in self.problems]
 
     def _line(self, name: str) -> int | None:
@@ -200,7 +200,7 @@ class _MapReader:
         return self.spec.line(name)
 
     def _measures(self, settings: MapSettings) -> list[Any] | None:
-        """Measures to compute, without those whose options are already reported, unless none is left."""
+        """Measures to compute, without those whose options are faulty; ``status`` if none is left."""
         names = [p.name.split(".") for p in self.spec.problems]
         faulty = {parts[1] for parts in names if len(parts) > 2 and parts[0] == MAP}
         every = settings.measures()
@@ -209,7 +209,7 @@ class _MapReader:
         return [one for one in every if one not in faulty] or (["status"] if every else [])
 
     def _whole(self, place: str, over: Mapping[str, Any]) -> list[tuple[str, Any]]:
-        """Parameters with both ends of a range; of the others the names are checked."""
+        """Name and value of parameters, without ranges that lack an end; the names of those are checked as well."""
         found = []
         for name, one in over.items():
             if isinstance(one, RangeSettings) and None in (one.start, one.stop):
@@ -222,7 +222,7 @@ class _MapReader:
         return found
 
     def _per_area(self, place: str, over: Mapping[str, Any]) -> dict[str, Any]:
-        """Values per unit area; where the rig or a contact has an area, its file gives totals."""
+        """Values by name, with totals of a rig or contact with an area converted to values per unit area."""
         found: dict[str, Any] = {}
         for name, one in over.items():
             found[name] = one

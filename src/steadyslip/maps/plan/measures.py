@@ -1,7 +1,7 @@
-"""Measures: quantities of a map, which turn arrays of rig parameters into named arrays of results.
+"""Measures: quantities of a map, computed as named arrays of results from arrays of rig parameters.
 
 A measure is a record like a law, registered under its word in ``[map] compute``, with its options as fields. `measure`
-makes one of any other function of a rig.
+makes a measure from any other function of a rig.
 """
 
 from __future__ import annotations
@@ -36,14 +36,15 @@ from steadyslip.nonlinear.kicks.kicks import KICKS, OF_MACHINES, kicks_of
 from steadyslip.nonlinear.kicks.places import place_problems
 from steadyslip.protocol import Protocol
 
-SECONDS_A_STEP = 4e-8  # CPU time of a step in a lane, measured; only sets the size of chunks
-SECONDS_OF_DELAY = 1e-2  # CPU time to count the roots of a rig with delay, measured; only sets the size of chunks
+SECONDS_A_STEP = 4e-8  # CPU time (s) of a step in a lane, measured; only sets the size of chunks
+SECONDS_OF_DELAY = 1e-2  # CPU time (s) to count the roots of a rig with delay, measured; only sets the size of chunks
 PROBES = 64  # points at which the cost of a map is estimated; chosen by trial
-NOT_DONE = -1  # integer stored where nothing is computed
+NOT_DONE = -1  # integer stored at points that are not computed yet
 NOT_SLIDING = "no steady sliding, or out of range"
-"""Why a result may be missing: only the result `status` tells which of the two it is."""
+"""`Output.missing` of results that need steady sliding; the result `status` distinguishes the two reasons."""
 NO_EDGE = "no steady sliding, out of range, or no edge"
-"""The same, or stable or unstable at every value; rigs at some of the points are analysed for the reason."""
+"""`Output.missing` of results that need an edge; no edge: stable, or unstable, at every value. Summaries analyse rigs
+at some of the points to find the reason."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +55,15 @@ class Output:
     ----------
     name, unit, meaning : str
     flags : tuple of str
-        Meanings of the numbers 0, 1, ...; such arrays hold small integers, -1 where nothing is computed yet.
+        Meanings of the numbers 0, 1, ... of an array of small integers, which is -1 at points not computed yet; empty
+        for an array of floats.
     extra : tuple of (str, int)
         Name and size of each dimension besides those of the map.
     missing : str
-        Why a point may have no value, for figures and summaries: `NOT_SLIDING`, `NO_EDGE`, or words such as "does not
-        hunt"; empty if every point has one.
+        Reason, for figures and summaries, why a point has no value: `NOT_SLIDING`, `NO_EDGE`, or words such as "does
+        not hunt"; empty if every point has a value.
     infinite : str
-        What an infinite value means, in words; empty if there is none.
+        Meaning of an infinite value, in words; empty if values are always finite.
     """
 
     name: str
@@ -85,41 +87,41 @@ class Measure(FrozenRecord, family="measure"):
     """Base class of the quantities of a map.
 
     A subclass is registered under a name, declares its `outputs` and computes them in `arrays`. The result at a point
-    must depend on its parameters alone, not on which other points are computed with it. Arrays shorter than declared in
-    further dimensions are padded.
+    must depend only on its parameters, not on the other points computed in the same call. Arrays that are shorter than
+    declared along extra dimensions are padded.
     """
 
     moves: ClassVar[bool] = False
-    """True if the protocol matters; otherwise its varying parameters are not passed to the measure."""
+    """True if the measure simulates the protocol; otherwise varied protocol parameters are not passed to it."""
     held: ClassVar[bool | None] = False
-    """True if it is of rigs that hold a place, False of those that slide steadily, None of both."""
+    """True if the measure is for rigs that hold a place, False if for rigs that slide steadily, None if for both."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
-        """Declarations of the arrays, if the named parameters vary."""
+        """Declarations of the result arrays, for a map in which the named parameters vary."""
         raise NotImplementedError
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        """Arrays by output name, for parameters in SI units that broadcast against each other."""
+        """Result arrays by output name; `vary` has parameter arrays (SI units) that broadcast against each other."""
         raise NotImplementedError
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
-        """Problems of computing it for this rig."""
+        """Yield a Problem for each reason why the measure cannot be computed for this rig."""
         yield from ()
 
     def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
-        """CPU time per point (s), estimated; `probes` are parameters at some points of the map.
+        """Estimated CPU time per point (s); `probes` has parameter values at some points of the map.
 
-        Must be reproducible (not measured), because chunk sizes depend on it and the same map must get the same chunks.
+        Must be reproducible (not measured), because the same map must always get chunks of the same size.
         """
         present = [name for name in probes if name in rig.parameters()]
         model = operating_point(rig, None, present).model
         if model.delays:
             return SECONDS_OF_DELAY
-        # CPU time measured: closed form, eigenvalues of a block, of a machine
+        # measured CPU times (s): closed form; eigenvalues of a block; eigenvalues of a machine
         return 1.2e-7 if has_closed_form(model) else 4e-6 if model.is_single else 2e-5
 
     def definition(self) -> dict[str, Any]:
-        """Name and options as JSON-ready dict; equal for equal measures."""
+        """Name and options as a JSON-ready dict, which is equal for equal measures."""
         options = {item.name: getattr(self, item.name) for item in fields(self)}
         found = {"name": self.name, **{name: value for name, value in options.items() if value is not None}}
         if not type(self).__module__.startswith("steadyslip."):
@@ -128,7 +130,7 @@ class Measure(FrozenRecord, family="measure"):
 
 
 class GrowthRate(Measure, name="growth_rate"):
-    """Largest real part of the eigenvalues; see `steadyslip.growth_rate`."""
+    """Largest real part of the eigenvalues (1/s); see `steadyslip.growth_rate`."""
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         meaning = "growth rate of small disturbances"
@@ -158,7 +160,7 @@ def _leading(point: OperatingPoint) -> Any:
     with np.errstate(all="ignore"):
         first = np.argmax(np.where(np.isnan(found.real), -np.inf, found.real), axis=-1)
         s = np.take_along_axis(found, first[..., None], axis=-1)[..., 0]
-        # neither what grows without limit nor what does not slide steadily has a frequency
+        # ill-posed rigs, and rigs without steady sliding, have no frequency
         s = np.where(is_ill_posed(point) | np.isnan(s.real), complex(np.nan, np.nan), s)
         return np.stack([np.abs(s.imag) / (2 * np.pi), -s.real / np.abs(s)], axis=-1)
 
@@ -224,7 +226,7 @@ class Events(Measure, name="events"):
 
 
 def _contact_numbers(rig: Slider | Machine, name: str, contact: np.ndarray) -> dict[str, np.ndarray]:
-    """Contact names of a machine as numbers, for an output with words; empty for a slider."""
+    """Array of contact names as numbers from 0 (none), for the output `name`; empty dict for a slider."""
     if not rig.contact_names:
         return {}
     numbers = {own: number for number, own in enumerate(("", *rig.contact_names))}
@@ -232,7 +234,7 @@ def _contact_numbers(rig: Slider | Machine, name: str, contact: np.ndarray) -> d
 
 
 def _meaning(name: str) -> str:
-    """Meaning of a column of event statistics, with its contact."""
+    """Meaning of a column of event statistics, from its name: words, and the contact of a machine."""
     contact, _, plain = name.rpartition(".")
     return plain.replace("_", " ") + (f" of {contact}" if contact else "")
 
@@ -284,7 +286,7 @@ class KickThreshold(Measure, name="threshold"):
 
 @dataclass(frozen=True)
 class FunctionMeasure:
-    """Measure that calls a function of a rig; made by `measure`."""
+    """Measure that calls a function of a rig; `measure` makes it."""
 
     name: str
     function: Callable[..., Any]
@@ -307,7 +309,7 @@ class FunctionMeasure:
         return {self.name: found.reshape(shape)}
 
     def _at(self, rig: Slider | Machine, point: dict[str, float]) -> float:
-        """Result at one point: NaN for an error of this package; other exceptions are reported with the point."""
+        """Result at one point; NaN for errors of this package, while other exceptions are reported with the point."""
         try:
             return float(self.function(rig.with_values(point)))
         except SteadyslipError:
@@ -331,7 +333,7 @@ class FunctionMeasure:
 
 
 def source_digest(thing: Any) -> str:
-    """Short hash of a function or class: of its source and of the values it holds (closure, defaults, attributes)."""
+    """Hash (16 hexadecimal digits) of a function or class: source and values in closure, defaults and attributes."""
     if isinstance(thing, partial):
         text = f"{source_digest(thing.func)} {thing.args!r} {sorted(thing.keywords.items())!r}"
     else:
@@ -357,7 +359,7 @@ def measure(
     arrays: bool = False,
     seconds: float | None = None,
 ) -> Any:
-    """Make a measure of a function of a rig; usable as a decorator.
+    """Make a measure from a function of a rig; usable as a decorator.
 
     Parameters
     ----------

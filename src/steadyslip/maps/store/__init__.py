@@ -1,1 +1,1 @@
-"""Where a map lies: a folder that stays inside itself, its layout, its arrays. Knows nothing of who computes."""
+"""Storage of a map: a folder with checked access, its layout and its arrays. Independent of how maps are computed."""

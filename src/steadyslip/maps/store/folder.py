@@ -1,7 +1,7 @@
 """Zarr store for the folder of a map, restricted to regular files of declared sizes within the folder.
 
-The folder of a map may come from a stranger. No link is followed, nothing can block, and no chunk may unpack to more
-bytes than its array has.
+The folder of a map may come from an untrusted source. No link is followed, no read can block, and no chunk may unpack
+to more bytes than its array has.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from steadyslip.maps.plan.axes import COMPLETE
 
 METADATA = 2**26
 """Largest size of a metadata file, bytes; chosen by trial, far above those of any map."""
-_HEAD, _OVERHEAD = 16, 64  # bytes of Blosc's header, and bound of all that codecs add to a chunk
+_HEAD, _OVERHEAD = 16, 64  # bytes of Blosc's header, and upper bound of what codecs add to a chunk
 
 
-class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr is followed no further
+class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr's types are not checked
     """Zarr's store of local files, with checks before each access.
 
-    `sizes` are the unpacked bytes of a chunk by name of the array.
+    `sizes` has the unpacked size (bytes) of a chunk by name of the array.
     """
 
     def __init__(self, root: Path | str, *, read_only: bool = False) -> None:
@@ -36,7 +36,7 @@ class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr is followed no furthe
         return found
 
     def _check_file(self, key: str) -> None:
-        """Raise an error before reading something that is no regular file or too large."""
+        """Raise an error if the file of a key is not a regular file or too large."""
         path = inside(self.root, key)
         try:
             found = path.lstat()
@@ -47,12 +47,12 @@ class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr is followed no furthe
         check_kind(str(path), found)
         most = METADATA
         if "/c/" in key:
-            most = self.sizes.get(key.split("/")[0], 0) + _OVERHEAD  # of a mark or chunk; 64 for unknown arrays
+            most = self.sizes.get(key.split("/")[0], 0) + _OVERHEAD  # file of a chunk; 64 bytes for unknown arrays
         if found.st_size > most:
-            raise UnreadableFile(str(path), f"it has {found.st_size} bytes, more than the {most} that it may have")
+            raise UnreadableFile(str(path), f"it has {found.st_size} bytes; allowed: {most}")
 
     def _checked_chunk(self, key: str, found: Any) -> Any:
-        """Raise an error for a chunk whose header declares another size than its array has."""
+        """Content of a chunk, after a check that its header declares the size that its array needs."""
         name = key.split("/")[0]
         if found is None or "/c/" not in key or not self.sizes.get(name):
             return found

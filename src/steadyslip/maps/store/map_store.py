@@ -2,8 +2,7 @@
 
 All arrays are created with the store; later only chunks are written, each by one process, by moving whole files into
 place. A chunk's mark is written last and is the checksum of the chunk's files, so that a chunk counts as done only if
-all its files are those that were written. Zarr writes no file for a chunk of fill values only, which the checksum
-covers as well.
+its files are unchanged since. For a chunk of fill values only, Zarr writes no file; the checksum covers that as well.
 """
 
 from __future__ import annotations
@@ -32,12 +31,12 @@ from steadyslip.maps.plan.axes import COMPLETE, SAMPLE
 from steadyslip.maps.plan.map import Map, differences
 from steadyslip.maps.store.store_layout import coordinates, lay_out, read_layout
 
-_CHECKSUM_OFFSET = 1 << 32  # added to every checksum, so that none is zero, the fill value
-_MARK = 8  # bytes of a mark
+_CHECKSUM_OFFSET = 1 << 32  # bit set in every checksum, so that none is zero, the fill value of marks
+_MARK = 8  # size of a mark, bytes
 
 
 class Store:
-    """Open map.
+    """Stored map, opened; writable if its folder is.
 
     Attributes
     ----------
@@ -84,7 +83,7 @@ class Store:
         return int(np.prod(self.grid, dtype=int))
 
     def read(self, name: str, region: Any = ...) -> np.ndarray:
-        """Values of an array; fill values where no chunk is done.
+        """Values of an array, or of a region of it; fill values in chunks that are not done.
 
         Raises
         ------
@@ -102,11 +101,11 @@ class Store:
             raise self.damage(name, error) from error
         words = self.layout.arrays[name].attributes.get("flag_meanings")
         if words is not None and values.size and not (values.min() >= -1 and values.max() + 1 < len(words.split())):
-            raise self.damage(name, ValueError("it has kinds that it has no words for"))
+            raise self.damage(name, ValueError("it has numbers without a meaning in flag_meanings"))
         return values
 
     def _touched(self, name: str, region: Any) -> Iterator[int]:
-        """Chunks that a region of a result or of generated samples overlaps (or lies around)."""
+        """Yield the chunks that a region of a result or of generated samples may overlap."""
         axes = self.dims if name in self.results else self.dims[-1:] if name in self.generated else ()
         first = len(self.dims) - len(axes)
         given = list(region) if isinstance(region, tuple) else [region]
@@ -121,11 +120,11 @@ class Store:
             yield int(np.ravel_multi_index((0,) * first + indices, self.grid))
 
     def damage(self, what: str, error: Exception) -> NotAvailable:
-        """Error for files that cannot be read."""
+        """NotAvailable error for a part of the map (`what`) that cannot be read."""
         return NotAvailable(f"{str(self.path)!r} is damaged ({what}: {error}); compute the map again to repair it")
 
     def rig(self) -> Slider | Machine:
-        """Base rig.
+        """Rig of the map, with the values of all parameters that do not vary.
 
         Raises
         ------
@@ -137,7 +136,7 @@ class Store:
         return rig_from_text(self.rig_text, str(self.path)).named(self.layout.rig_file)
 
     def region(self, number: int) -> tuple[slice, ...]:
-        """Region of a chunk, a slice per dimension."""
+        """Region of a chunk: one slice per dimension of the map."""
         indices = np.unravel_index(number, self.grid)
         return tuple(
             slice(int(i) * c, min((int(i) + 1) * c, n))
@@ -150,13 +149,13 @@ class Store:
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """All parameters that vary."""
+        """Names of all parameters that vary."""
         return tuple(dim for dim in self.dims if dim != SAMPLE) + self.sampled
 
     def parameters(self, region: tuple[slice, ...], generated: bool = False) -> dict[str, Any]:
-        """Stored values of the parameters that vary, shaped to broadcast over a chunk.
+        """Stored values of the varied parameters by name, shaped to broadcast over the region of a chunk.
 
-        `generated` adds those that are stored only with their chunk.
+        `generated` adds sample parameters, which are stored chunk by chunk.
         """
         found = {}
         for i, dim in enumerate(self.dims):
@@ -170,7 +169,7 @@ class Store:
     # -- chunks ------------------------------------------------------------------------------------------
 
     def write(self, number: int, results: Mapping[str, Any], samples: Mapping[str, Any]) -> None:
-        """Write a chunk's arrays, then its mark; `samples` are generated parameters, (n,)."""
+        """Write a chunk's results, then its mark; `samples` has the generated parameters, (n,) each, by name."""
         region = self.region(number)
         for file in self._files(number):
             check_room(file).unlink(missing_ok=True)  # files of a damaged chunk must not be read
@@ -188,15 +187,15 @@ class Store:
         return self._mark(number) != 0
 
     def damaged(self) -> list[int]:
-        """Chunks with a mark whose files are not those that were written."""
+        """Numbers of the chunks with a mark whose files do not have its checksum."""
         return [n for n, mark in enumerate(self._marks()) if mark != 0 and not self._is_intact(n, int(mark))]
 
     def forget(self, number: int) -> None:
-        """Remove a chunk's mark."""
+        """Remove a chunk's mark, so that it counts as not done."""
         self.marks[np.unravel_index(number, self.grid)] = np.uint64(0)
 
     def pending(self) -> list[int]:
-        """Chunks without a mark."""
+        """Numbers of the chunks without a mark."""
         return [int(n) for n in np.flatnonzero(self._marks() == 0)]
 
     def marked(self) -> int:
@@ -226,7 +225,7 @@ class Store:
             return
         for entry in entries:
             if not entry.name.isdecimal() or len(entry.name) > 9 or int(entry.name) >= self.grid[len(at)]:
-                continue  # left by a process that was killed
+                continue  # a temporary file of a killed process
             here = (*at, int(entry.name))
             if len(here) == len(self.grid):
                 found[here] = self._mark_in(Path(entry.path))
@@ -246,7 +245,7 @@ class Store:
         return int.from_bytes(content, "little") if len(content) == _MARK else 0
 
     def _has_samples(self, number: int) -> bool:
-        """True if a chunk stores the sample parameters of its part of the sample dimension."""
+        """True if this chunk, among those with the same samples, is the one that stores the sample parameters."""
         indices = np.unravel_index(number, self.grid)
         return bool(self.generated) and not any(int(i) for i in indices[:-1])
 
@@ -270,7 +269,7 @@ class Store:
         return total | _CHECKSUM_OFFSET
 
     def tidy(self) -> None:
-        """Remove unfinished files of processes that were killed."""
+        """Remove temporary files of processes that were killed."""
         for file in self.path.rglob("*.partial"):
             with suppress(OSError):
                 file.unlink()
@@ -278,7 +277,7 @@ class Store:
             shutil.rmtree(folder, ignore_errors=True)
 
     def restore(self, plan: Map) -> None:
-        """Write damaged coordinates again, which no mark covers."""
+        """Write coordinates that are damaged again (marks cover only chunks)."""
         for name, values in coordinates(plan).items():
             inside(self.path, f"{name}/c/0")
             try:
@@ -312,26 +311,26 @@ class Store:
             yield  # also if this file system has no locks
 
     def refuse_another_program(self) -> None:
-        """Raise an error if another program computed the map, as its points are not mixed with new ones.
+        """Raise an error if another version of this program computed the map, because versions must not be mixed.
 
         Raises
         ------
         NotAvailable
-            With both programs.
+            If the versions differ; the message has both.
         """
         if other := of_another(self.version):
             raise NotAvailable(
                 f"{str(self.path)!r} was {other}; points of two programs are not mixed. Give another name, or delete "
-                "the map to have it computed anew; what it holds can be opened as it is"
+                "the map to compute it anew; its present content can still be opened"
             )
 
     def refuse_other(self, plan: Map) -> None:
-        """Raise an error unless the stored chunks are of the same map, rig and version.
+        """Raise an error unless the stored map has the definition of `plan` and this program's version.
 
         Raises
         ------
         NotAvailable
-            With the differences.
+            If they differ; the message lists the differences.
         """
         self.refuse_another_program()
         if found := differences(self.definition, json.loads(json.dumps(plan.definition()))):
@@ -343,12 +342,12 @@ class Store:
 
 
 def open_or_create(path: Path, plan: Map) -> Store:
-    """Open the store of a map, created if missing.
+    """Open the store of a map; create it if it does not exist.
 
     Raises
     ------
     NotAvailable
-        If the path is something else or another map, or cannot be written.
+        If the path exists and is not this map, or cannot be written.
     """
     if not path.exists():
         _create(path, plan)
@@ -358,7 +357,7 @@ def open_or_create(path: Path, plan: Map) -> Store:
 
 
 def _create(path: Path, plan: Map) -> None:
-    """Create a store under a temporary name and move it into place, so that it is never incomplete."""
+    """Create a store under a temporary name and rename it, so that an incomplete store never has the final name."""
     new = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.new")
     try:
         new.mkdir()
@@ -374,12 +373,12 @@ def _create(path: Path, plan: Map) -> None:
 
 
 def cannot_write(path: Path, error: OSError) -> NotAvailable:
-    """Error for a failure to write."""
+    """NotAvailable error for a path that cannot be written, with the system's reason."""
     return NotAvailable(f"cannot write {str(path)!r}: {(error.strerror or str(error)).lower()}")
 
 
 def check_path(path: Path) -> None:
-    """Raise an error for a path that no store can have, before anything is computed.
+    """Raise an error if no store can be written to a path; called before anything is computed.
 
     Raises
     ------

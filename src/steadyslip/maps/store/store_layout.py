@@ -28,9 +28,9 @@ from steadyslip.maps.plan.map import MOST_AXIS, MOST_CHUNKS, Map, roles
 from steadyslip.maps.plan.measures import NOT_DONE
 from steadyslip.maps.store.folder import METADATA
 
-FORMAT = 2  # version of the layout
-MOST_CHUNK = 2**30  # bytes of a chunk of one array: fits into the memory of any machine
-MOST_EXTRA = 1000  # values of a result at one point; chosen by trial, far above those of any measure
+FORMAT = 2  # version number of the layout
+MOST_CHUNK = 2**30  # largest chunk of one array, bytes: fits into the memory of any machine
+MOST_EXTRA = 1000  # largest number of values of a result at one point; chosen by trial, far above any measure's
 _VERSIONS = ("numpy", "scipy", "llvmlite", "zarr")
 _TEXTS = ("title", "rig", "rig_file", "definition", "dims", "results", "steadyslip", "versions", "coordinates",
           "seal")  # fmt: skip
@@ -40,13 +40,13 @@ _FILL = {"float64": np.nan, "int8": NOT_DONE, "uint64": 0}  # fill values: nothi
 _PACKED, _PLAIN = ("bytes", "blosc", "crc32c"), ("bytes",)
 
 
-REASONS = ("missing", "infinite")  # attributes of a result with words on points without a number, as in `Output`
+REASONS = ("missing", "infinite")  # fields of `Output` that are stored as attributes of a result
 
 Form = tuple[tuple[str, ...], tuple[int, ...], tuple[int, ...]]
 
 
 class LayoutError(ValueError):
-    """Error: metadata are not those of a map."""
+    """The metadata of a folder are not those of a map."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class StoredArray:
 
     @property
     def unpacked(self) -> int:
-        """Size of a chunk in memory, bytes."""
+        """Size of a chunk in memory (uncompressed), bytes."""
         return math.prod(self.chunks) * np.dtype(self.dtype).itemsize
 
 
@@ -77,10 +77,13 @@ class MapLayout:
     ----------
     definition, versions : dict
     version, title, rig_text, rig_file : str
-        The last is the name of the file that the rig was read from; empty if there is none.
+        `version` is that of the program that computed the map; `rig_file` is the name of the file from which the rig
+        was read, empty if there is none.
     dims, results, sampled, generated : tuple of str
-        Dimensions; results; parameters along the sample dimension, and those of them that are stored chunk by chunk.
+        Names of the dimensions; of the results; of the parameters along the sample dimension, and of those among them
+        that are generated and stored chunk by chunk.
     shape, chunks, grid : tuple of int
+        Points of the map, points of a chunk, and number of chunks, along each dimension.
     arrays : dict of str to StoredArray
     """
 
@@ -104,7 +107,7 @@ class MapLayout:
         return tuple(-(-n // c) for n, c in zip(self.shape, self.chunks, strict=True))
 
     def form(self, name: str, extra: Sequence[tuple[str, int]] = ()) -> Form:
-        """Dimensions, shape and chunks of an array: a result with further dimensions, a parameter, or the marks."""
+        """Dimensions, shape and chunks of an array: a result (with dimensions `extra`), a parameter, or the marks."""
         if name == COMPLETE:
             return tuple(f"{dim}_chunk" for dim in self.dims), self.grid, (1,) * len(self.dims)
         if name in self.results:
@@ -124,7 +127,7 @@ def read_layout(path: Path) -> MapLayout:
     Raises
     ------
     NotAvailable
-        If there is none, or it is not as this program writes it.
+        If there is no map, or its layout is not one that this program writes.
     """
     try:
         return _layout(json.loads(read_bytes(path / "zarr.json", METADATA, links=False)))
@@ -140,19 +143,22 @@ def _layout(document: Any) -> MapLayout:
     _require(fits_form(document, {"attributes": dict, "zarr_format": int, "consolidated_metadata": dict,
                                  "node_type": str}), "it is no Zarr group of format 3")  # fmt: skip
     _require((document["zarr_format"], document["node_type"]) == (3, "group"), "it is no Zarr group of format 3")
-    attributes = {"rig_file": ""} | document["attributes"]  # maps of earlier programs name no file
+    attributes = {"rig_file": ""} | document["attributes"]  # earlier versions did not store rig_file
     _require("steadyslip_map" in attributes, "it has no steadyslip_map")
     version = attributes["steadyslip_map"]
     _require(version == FORMAT, f"its layout has version {version!r:.20}, and this program reads version {FORMAT}")
-    _require(fits_form(attributes, {"steadyslip_map": int} | dict.fromkeys(_TEXTS, str)), "its attributes are others")
+    form = {"steadyslip_map": int} | dict.fromkeys(_TEXTS, str)
+    _require(fits_form(attributes, form), "its attributes are not those of a map")
     _require(_seal(document) == attributes["seal"], "it was changed since it was written")
     definition = _json(attributes, "definition", {"rig": dict, "compute": dict, "over": {str: dict}, "samples": dict})
     dims, results = (tuple(_json(attributes, name, [str])) for name in ("dims", "results"))
     samples = definition["samples"]
     over = samples.get("over", {})
-    _require(isinstance(over, dict) and all(isinstance(one, dict) for one in over.values()), "samples have no over")
+    tables = isinstance(over, dict) and all(isinstance(one, dict) for one in over.values())
+    _require(tables, "its samples have no valid over")
     sampled = tuple(over)
-    _require(dims == (*definition["over"], *([SAMPLE] if samples else [])) and dims, "dims are not those defined")
+    defined = (*definition["over"], *([SAMPLE] if samples else []))
+    _require(dims == defined and dims, "dims do not agree with its definition")
     sizes = [one.get("points", one.get("values")) for one in definition["over"].values()]
     sizes += [samples.get("points")] if samples else []
     _require(fits_form(sizes, [int]) and all(n > 0 for n in sizes), "the definition has no numbers of points")
@@ -181,7 +187,7 @@ def _require(condition: object, message: str) -> None:
 
 def _json(attributes: dict[str, Any], name: str, form: Any) -> Any:
     found = json.loads(attributes[name])
-    _require(fits_form(found, form), f"{name} has another form")
+    _require(fits_form(found, form), f"its attribute {name} has a wrong structure")
     return found
 
 
@@ -190,29 +196,30 @@ def _array(name: str, stored: Any, codecs: tuple[str, ...]) -> StoredArray:
         _require(condition, f"{name!r:.60}: {what}")
 
     demand(name not in ("", ".", "..", "zarr.json") and not {"/", "\0"} & set(name), "is no name of an array")
-    demand(isinstance(stored, dict) and set(stored) == _ARRAY, "its metadata are others")
-    demand((stored["zarr_format"], stored["node_type"], stored["storage_transformers"]) == (3, "array", []), "format")
+    demand(isinstance(stored, dict) and set(stored) == _ARRAY, "wrong keys in its metadata")
+    format_ = (stored["zarr_format"], stored["node_type"], stored["storage_transformers"])
+    demand(format_ == (3, "array", []), "wrong Zarr format")
     dtype = stored["data_type"]
-    demand(dtype in ("uint64",) if codecs == _PLAIN else dtype in ("float64", "int8"), "element type")
-    demand(stored["fill_value"] == ("NaN" if dtype == "float64" else _FILL[dtype]), "what it holds")
+    demand(dtype in ("uint64",) if codecs == _PLAIN else dtype in ("float64", "int8"), "wrong element type")
+    demand(stored["fill_value"] == ("NaN" if dtype == "float64" else _FILL[dtype]), "wrong fill value")
     kinds = [one.get("name") if isinstance(one, dict) else None for one in _listed(stored["codecs"])]
     demand(tuple(kinds) == codecs, f"codecs are {kinds!r:.60}, allowed: {', '.join(codecs)}")
     options = [one.get("configuration", {}) for one in stored["codecs"]]
-    demand(fits_form(options, [dict]) and options[0].get("endian", "little") == "little", "options of codecs")
-    demand(len(options) == 1 or options[1].get("cname") == "zstd", "options of codecs")
+    demand(fits_form(options, [dict]) and options[0].get("endian", "little") == "little", "wrong codec options")
+    demand(len(options) == 1 or options[1].get("cname") == "zstd", "wrong codec options")
     keys = {"name": "default", "configuration": {"separator": "/"}}
-    demand(stored["chunk_key_encoding"] == keys, "names of chunks")
+    demand(stored["chunk_key_encoding"] == keys, "wrong chunk_key_encoding")
     parts = stored["chunk_grid"]
-    demand(fits_form(parts, {"name": str, "configuration": {"chunk_shape": [int]}}), "chunks")
+    demand(fits_form(parts, {"name": str, "configuration": {"chunk_shape": [int]}}), "wrong chunk_grid")
     dims, shape, chunks = stored["dimension_names"], stored["shape"], parts["configuration"]["chunk_shape"]
-    demand(parts["name"] == "regular" and fits_form(dims, [str]) and fits_form(shape, [int]), "shape")
-    demand(len(dims) == len(shape) == len(chunks) <= 32, "shape")
+    demand(parts["name"] == "regular" and fits_form(dims, [str]) and fits_form(shape, [int]), "wrong shape or chunks")
+    demand(len(dims) == len(shape) == len(chunks) <= 32, "wrong number of dimensions")
     demand(all(c > 0 and n > 0 for n, c in zip(shape, chunks, strict=True)), f"has shape {shape} in chunks of {chunks}")
     attributes = stored["attributes"]
     demand(isinstance(attributes, dict) and isinstance(attributes.get("units"), str), "has no units")
     demand(isinstance(attributes.get("long_name"), str), "has no long_name")
     words = attributes.get("flag_meanings")
-    demand((dtype == "int8") == isinstance(words, str), "words for its numbers")
+    demand((dtype == "int8") == isinstance(words, str), "flag_meanings missing, or given for floats")
     return StoredArray(dtype, tuple(dims), tuple(shape), tuple(chunks), attributes)
 
 
@@ -221,7 +228,7 @@ def _listed(value: Any) -> list[Any]:
 
 
 def _check_arrays(layout: MapLayout) -> None:
-    """Verify that shapes follow from the definition, and that no array is too large."""
+    """Raise an error if a shape does not follow from the definition, or an array is too large."""
     rank = len(layout.dims)
     _require(math.prod(layout.shape) <= MOST_POINTS, f"it has more than {MOST_POINTS:.0e} points")
     _require(math.prod(layout.grid) <= MOST_CHUNKS, f"it has {math.prod(layout.grid)} chunks, allowed: {MOST_CHUNKS}")
@@ -246,7 +253,7 @@ def _seal(document: dict[str, Any]) -> str:
 
 
 def new_layout(plan: Map) -> MapLayout:
-    """Layout of a new map."""
+    """MapLayout of a map that is to be created, with its arrays."""
     try:
         rig = stored_text(plan.rig, plan.protocol)
     except ParameterError:
@@ -260,8 +267,8 @@ def new_layout(plan: Map) -> MapLayout:
     )  # fmt: skip
     known = roles(plan)
     for name in plan.varied:
-        said = {"units": known[name].unit, "long_name": known[name].doc}
-        layout.arrays[name] = StoredArray("float64", *layout.form(name), said)
+        described = {"units": known[name].unit, "long_name": known[name].doc}
+        layout.arrays[name] = StoredArray("float64", *layout.form(name), described)
     for output in outputs:
         attributes: dict[str, Any] = {"units": output.unit, "long_name": output.meaning}
         if output.flags:
@@ -269,8 +276,8 @@ def new_layout(plan: Map) -> MapLayout:
             attributes["flag_meanings"] = " ".join(word.replace(" ", "_") for word in ("not computed", *output.flags))
         attributes |= {key: text for key in REASONS if (text := getattr(output, key))}
         layout.arrays[output.name] = StoredArray(output.dtype, *layout.form(output.name, output.extra), attributes)
-    said = {"units": "1", "long_name": "checksum of each finished chunk, 0 until then"}
-    layout.arrays[COMPLETE] = StoredArray("uint64", *layout.form(COMPLETE), said)
+    described = {"units": "1", "long_name": "checksum of each finished chunk, 0 until then"}
+    layout.arrays[COMPLETE] = StoredArray("uint64", *layout.form(COMPLETE), described)
     return layout
 
 
@@ -310,7 +317,7 @@ def lay_out(path: Path, plan: Map) -> None:
         zarr.consolidate_metadata(str(path))
     _seal_file(path / "zarr.json")
     for file in path.rglob("*"):
-        if file.is_file():  # metadata and coordinates cannot be recomputed: write them through to disk
+        if file.is_file():  # flush metadata and coordinates to disk, because they cannot be recomputed
             with open(file, "rb") as written:
                 os.fsync(written.fileno())
 
@@ -322,7 +329,7 @@ def _seal_file(file: Path) -> None:
 
 
 def coordinates(plan: Map) -> dict[str, np.ndarray]:
-    """Parameters whose values are written when the store is created."""
+    """Values (SI units), by name, of the parameters that are written when the store is created."""
     found = {axis.name: axis.values for axis in plan.axes}
     if plan.sampling and not isinstance(plan.sampling, Generated):
         found |= plan.sampling.part(0, plan.sampling.points)
@@ -330,7 +337,7 @@ def coordinates(plan: Map) -> dict[str, np.ndarray]:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the packages that results depend on."""
+    """Versions, by name, of the installed packages on which results depend."""
     from importlib.metadata import version
 
     return {name: version(name) for name in _VERSIONS}

@@ -1,1 +1,1 @@
-"""What is seen of a map: its result, cuts through it, other files of it."""
+"""Access to a computed map: its result, sections for figures, export to other file formats."""

@@ -12,7 +12,7 @@ from steadyslip.maps.view.cut import View
 from steadyslip.maps.view.map_result import MapResult
 from steadyslip.model.point import operating_point
 
-ASKED = 12  # points analysed for an explanation, evenly chosen; chosen by trial
+ASKED = 12  # largest number of points that are analysed for an explanation; chosen by trial
 _REASONS = {
     ABSENT: WORDS[ABSENT],
     UNKNOWN: WORDS[UNKNOWN],
@@ -23,9 +23,9 @@ _REASONS = {
 
 
 def without_number(found: MapResult, view: View, name: str, hatched: bool = False) -> str:
-    """Explanation of the points of a figure without a value of a result; empty if there are none.
+    """Text that explains why points of a figure have no value of a result; empty if all have one.
 
-    `hatched`: the figure already marks points without steady sliding or out of range.
+    With `hatched`, the figure already marks points without steady sliding or out of range.
     """
     values = np.asarray(view.values[name], dtype=float)
     if hatched:
@@ -45,7 +45,7 @@ def without_number(found: MapResult, view: View, name: str, hatched: bool = Fals
 
 
 def points_at(view: View, rows: np.ndarray) -> list[dict[str, float]]:
-    """Parameters of the rig at some of a figure's points, given by their indices (n, dimensions)."""
+    """Parameters of the rig, by name, at up to `ASKED` of a figure's points with indices `rows` (n, dimensions)."""
     points = []
     for row in rows[np.unique(np.linspace(0, len(rows) - 1, ASKED).astype(int))]:
         place = {n: float(p[i]) for n, p, i in zip(view.names, view.places, row[::-1], strict=True)}
@@ -54,7 +54,7 @@ def points_at(view: View, rows: np.ndarray) -> list[dict[str, float]]:
 
 
 def _reasons(found: MapResult, view: View, rows: np.ndarray) -> list[str]:
-    """Reason for each point; none for samples, whose medians the figure shows."""
+    """Reason for each point that is analysed; empty for samples, of which the figure shows medians."""
     try:
         rig = found.rig
         points = points_at(view, rows) if not view.bands else []

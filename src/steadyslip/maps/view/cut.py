@@ -1,4 +1,4 @@
-"""Section of a map for a figure: one or two parameters vary, others are held, samples are summarised."""
+"""Section of a map for a figure: one or two parameters vary, others are fixed, samples are summarised."""
 
 from __future__ import annotations
 
@@ -25,37 +25,37 @@ from steadyslip.linear.status import STABLE
 from steadyslip.maps.plan.axes import SAMPLE
 from steadyslip.maps.view.map_result import MapResult
 
-MOST = 500  # points along an axis: more than a figure resolves
-MOST_IN_ALL = 2 * 10**7  # values read, samples included: 160 MB
-MOST_SCATTERED = 5000  # points of a scatter plot; chosen by trial, as more overlap
+MOST = 500  # largest number of points along an axis: more than a figure resolves
+MOST_IN_ALL = 2 * 10**7  # largest number of values read, samples included: 160 MB
+MOST_SCATTERED = 5000  # largest number of points of a scatter plot; chosen by trial: more would overlap
 BAND = (0.025, 0.5, 0.975)  # quantiles of samples: median and 95 % band
 FAILING = ("safety_factor", "margin")
-"""Results that a sample lacks if it is stable at all stiffnesses, or fails (stable at none, no steady sliding)."""
+"""Results without a value at samples that are stable at all stiffnesses, or fail (stable at none, no sliding)."""
 
 
 @dataclass(frozen=True, eq=False)
 class View(ReadOnly):
-    """Numbers of a figure, in SI units.
+    """Numbers of a section of a map for a figure, in SI units.
 
     Attributes
     ----------
     names : tuple of str
         Parameters on the axes, x first.
     places : tuple of ndarray
-        Values of these parameters: of the grid, or of each scattered point.
+        Values of these parameters: along the grid, or at each scattered point.
     values : dict of str to ndarray
-        Results, (nx,), (ny, nx), or (m,) if scattered, with further dimensions of the result at the end; medians over
-        samples.
+        Results: (nx,), (ny, nx), or (m,) if scattered, then extra dimensions of the result; medians over samples.
     bands : dict of str to ndarray
-        2.5, 50 and 97.5 % quantiles over samples, first axis; empty without samples. For results in `FAILING`, samples
-        without a value count as failures, below all others; for others they are left out.
+        2.5, 50 and 97.5 % quantiles over samples along the first axis; empty without samples. For results in `FAILING`,
+        samples without a value count as failures, below all values; for other results they are left out.
     missing : dict of str to ndarray
         Share of samples without a value, for the results in `bands`.
     shares : dict of str to ndarray
-        For results that are kinds: share of samples of each kind, first axis; empty without samples.
+        For results with kinds: share of samples of each kind along the first axis; empty without samples.
     held : dict of str to float
-        Other parameters and their fixed values.
+        Fixed values of the other parameters.
     scattered : bool
+        True if the points are samples, not a grid.
     """
 
     names: tuple[str, ...]
@@ -69,12 +69,12 @@ class View(ReadOnly):
 
 
 def axes_of(found: MapResult, x: str | None, y: str | None, facet: str | None = None) -> tuple[str, ...]:
-    """Full names of the parameters on the axes; by default the map's first ones, except that of the facets.
+    """Full names of the parameters on the axes; by default the map's first one or two, without the `facet` parameter.
 
     Raises
     ------
     ParameterError
-        If a name is not one of those that vary.
+        If a name is not that of a varied parameter, or the two do not fit together.
     """
     own = [dim for dim in found.dims if dim not in (SAMPLE, facet) and found.shape[found.dims.index(dim)] > 1]
     problems, given = [], []
@@ -86,7 +86,7 @@ def axes_of(found: MapResult, x: str | None, y: str | None, facet: str | None = 
         except UnknownNameError:
             problems.append(Problem(place, unknown_name("parameter", name, found.parameters)))
     if len(set(given)) < len(given):
-        problems.append(Problem("y", f"got {y!r} on both axes; give another one"))
+        problems.append(Problem("y", f"got {y!r} on both axes; give another parameter"))
     if problems:
         raise ParameterError(problems)
     names = given or own[:2] or list(found.parameters)[:1]
@@ -96,7 +96,7 @@ def axes_of(found: MapResult, x: str | None, y: str | None, facet: str | None = 
         names = [given[0], *[n for n in own if n != given[0]][:1]] if given[0] in own else given
     sampled = [n not in found.dims for n in names]
     if any(sampled) and not all(sampled):
-        raise ParameterError([Problem("y", "one parameter is sampled and the other on a grid; choose two of one kind")])
+        raise ParameterError([Problem("y", "one parameter is sampled, the other on a grid; choose two of one kind")])
     return tuple(names)
 
 
@@ -107,7 +107,7 @@ def take(found: MapResult, names: Sequence[str], results: Sequence[str], at: Map
     ----------
     found : MapResult
     names : sequence of str
-        Full names of one or two parameters.
+        Full names of the one or two parameters on the axes.
     results : sequence of str
     at : mapping of str to float or str, optional
         Fixed values of other parameters; by default those nearest to the rig's own.
@@ -173,7 +173,7 @@ def _read_view(
 
 
 def _stable_samples(found: MapResult, part: Any, order: Sequence[str]) -> Array | None:
-    """Mask of samples that are stable; None if the map has no status."""
+    """Mask of the samples that are stable, with axes in the given order; None if the map has no status."""
     if "status" not in part:
         return None
     stable: Array = np.asarray(part["status"].transpose(*order).values) == STABLE
@@ -181,7 +181,7 @@ def _stable_samples(found: MapResult, part: Any, order: Sequence[str]) -> Array 
 
 
 def _with_failures(numbers: Array, stable: Array | None, result: str) -> tuple[Array, Array]:
-    """Values with missing ones made comparable (failed: lowest, stable without an edge: infinite), share of failed."""
+    """Values with missing ones replaced (failed: lowest; stable without edge: infinite), and share of failures."""
     none = ~np.isfinite(numbers)
     always = np.zeros_like(none) if stable is None else none & stable
     failed = none & ~always
@@ -190,7 +190,7 @@ def _with_failures(numbers: Array, stable: Array | None, result: str) -> tuple[A
 
 
 def _quantiles(numbers: Array, axis: int) -> Array:
-    """Quantiles in `BAND` of existing values, infinite ones included; NaN where there are none."""
+    """Quantiles `BAND` along an axis, of all values but NaN; NaN where all values are NaN; (3, ...)."""
     empty = np.all(np.isnan(numbers), axis=axis, keepdims=True)
     # with infinite values take one of the samples, because interpolation with infinity is undefined
     method: Any = "closest_observation" if np.isinf(numbers).any() else "linear"
@@ -201,7 +201,7 @@ def _quantiles(numbers: Array, axis: int) -> Array:
 def _fixed_values(
     found: MapResult, data: Any, names: Sequence[str], at: Mapping[str, Any]
 ) -> tuple[dict[str, float], dict[str, int]]:
-    """Values and indices along the dimensions that are not shown."""
+    """Fixed value and index of each dimension that is not on an axis of the figure, by name."""
     others = [dim for dim in found.dims if dim not in (*names, SAMPLE)]
     known, problems, wanted = dict.fromkeys(others), [], {}
     if not isinstance(at, Mapping):
@@ -227,7 +227,7 @@ def _fixed_values(
 
 
 def own_value(found: MapResult, name: str) -> float | None:
-    """Value of a parameter in the base rig; None if unknown."""
+    """Value (SI) of a parameter in the map's rig; None if it cannot be read."""
     try:
         rig = found.rig
         return rig.value(name)

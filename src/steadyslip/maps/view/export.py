@@ -1,4 +1,4 @@
-"""Export of a map to one netCDF or Parquet file, chunk by chunk so that memory stays small; variables read on use."""
+"""Export of a map to one netCDF or Parquet file, chunk by chunk to save memory; xarray variables read on demand."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FROM_STORE = ("title", "rig", "definition", "steadyslip", "versions")
 
 
 def to_netcdf(store: Store, read: Read, path: str | PathLike[str]) -> None:
-    """Write netCDF-4 with the map's dimensions, coordinates, units, rig and versions."""
+    """Write a netCDF-4 file with the map's results, dimensions, coordinates, units, rig and versions."""
     import netCDF4
 
     with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
@@ -63,7 +63,7 @@ def _variable(file: Any, store: Store, name: str) -> Any:
 
 
 def _within(chunks: tuple[int, ...], most: int = 2**17) -> tuple[int, ...]:
-    """Chunk sizes limited to `most` values in all, which readers of netCDF handle well."""
+    """Chunk sizes whose product is at most `most` values, which netCDF readers handle well."""
     found: list[int] = []
     for size in reversed(chunks):
         found.append(max(1, min(size, most)))
@@ -72,7 +72,7 @@ def _within(chunks: tuple[int, ...], most: int = 2**17) -> tuple[int, ...]:
 
 
 def to_parquet(store: Store, read: Read, path: str | PathLike[str]) -> None:
-    """Write one row per point, parameters first; results that are kinds as words.
+    """Write a Parquet file with one row per point, parameters first; results with kinds are written as words.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def _rows(store: Store, read: Read, number: int, pa: Any, notes: dict[str, str])
 
 
 class StoredValues(BackendArray):
-    """Array of a store, read by `Store.read`."""
+    """Array of a store for xarray, which reads it on demand by `Store.read`."""
 
     def __init__(self, store: Store, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
         self.store, self.name, self.shape, self.dtype = store, name, shape, dtype
@@ -143,7 +143,7 @@ class StoredValues(BackendArray):
 
 
 def lazily(data: Any, store: Store) -> Any:
-    """Dataset with its variables read through the store."""
+    """Copy of an xarray Dataset whose variables are read on demand through the store, which verifies checksums."""
     import xarray as xr
 
     found = {}

@@ -1,4 +1,4 @@
-"""Computed map (or part of one): values, summary, export and figures."""
+"""Computed map, complete or in part: values, summary, export and figures."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from steadyslip.maps.store.map_store import Store
 from steadyslip.maps.view import export
 from steadyslip.protocol import Protocol
 
-BLOCK = 2**22  # values read at a time: 32 MiB
+BLOCK = 2**22  # largest number of values read at a time: 32 MiB
 
 
 class MapResult(Displayed):
-    """Map on disk.
+    """Map stored on disk, complete or in part.
 
-    Opening reads no results; `dataset` reads on demand. A map that is still being computed can be opened too, and
-    contains what is finished.
+    Opening reads no results; `dataset` reads on demand. A map that is still being computed can be opened too; it
+    contains the finished chunks.
     """
 
     def __init__(self, store: Store) -> None:
@@ -48,17 +48,17 @@ class MapResult(Displayed):
 
     @property
     def rig(self) -> Slider | Machine:
-        """Base rig; NotAvailable if it has a law that cannot be written to a file."""
+        """Rig of the map, without the variations; NotAvailable if it has a law that cannot be written to a file."""
         return self._store.rig()
 
     @property
     def protocol(self) -> Protocol | None:
-        """Protocol of measures that simulate; None without any."""
+        """Protocol of measures that simulate; None if the map has none."""
         return protocol_from_text(str(self.dataset.attrs["rig"]), str(self.path))
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """Names of the dimensions: parameters, and ``sample`` for those that vary together."""
+        """Names of the dimensions: parameters on axes, and ``sample`` for parameters that vary together."""
         return self._store.dims
 
     @property
@@ -82,7 +82,7 @@ class MapResult(Displayed):
 
     @property
     def finished(self) -> tuple[int, int]:
-        """Number of finished chunks, and of all."""
+        """Number of finished chunks, and of all chunks."""
         return self._store.marked(), self._store.count
 
     @property
@@ -92,7 +92,7 @@ class MapResult(Displayed):
         return done == count
 
     def damaged(self) -> list[int]:
-        """Chunks whose files are not those that were written; `run_map` computes them again."""
+        """Numbers of chunks whose files were changed or damaged; `run_map` computes them again."""
         return self._store.damaged()
 
     @property
@@ -102,7 +102,7 @@ class MapResult(Displayed):
         Raises
         ------
         NotAvailable
-            If a file is damaged; for chunks, when they are read.
+            If a file is damaged; for chunks it is raised when they are read.
         """
         import xarray as xr
 
@@ -121,7 +121,7 @@ class MapResult(Displayed):
         return lazily(data, self._store)
 
     def words(self, name: str) -> tuple[str, ...]:
-        """Meanings of the numbers 0, 1, ... of a result that is one of several kinds; empty for numeric results."""
+        """Meanings of the numbers 0, 1, ... of a result with kinds, such as status; empty for numeric results."""
         meanings = str(self._store.layout.arrays[self._known(name)].attributes.get("flag_meanings", ""))
         return tuple(word.replace("_", " ") for word in meanings.split()[1:])
 
@@ -137,30 +137,29 @@ class MapResult(Displayed):
         return str(self._store.layout.arrays[name].attributes["units"])
 
     def why_missing(self, name: str) -> str:
-        """Why points may have no value of a result, as its `Output` declares; empty for maps of earlier programs."""
+        """Reason why points may have no value of a result (`Output.missing`); empty in maps of earlier versions."""
         return str(self._store.layout.arrays[name].attributes.get("missing", ""))
 
     def what_infinite(self, name: str) -> str:
-        """What an infinite value of a result means, as its `Output` declares; else "without limit"."""
+        """Meaning of an infinite value of a result (`Output.infinite`); "without limit" if it is not stored."""
         return str(self._store.layout.arrays[name].attributes.get("infinite", "without limit"))
 
     def along(self, name: str) -> str | None:
-        """Parameter along which a result is an edge, if it was chosen; else None."""
+        """Option `along` of a result that is an edge: the parameter chosen; None if none was chosen."""
         given = self._store.layout.definition["compute"].get(name, {})
         return given.get("along") if isinstance(given, dict) else None
 
     def area(self, name: str) -> float | None:
-        """Contact area (m^2) by which a result or parameter is shown as a total; None if it is shown in its own
-        unit.
-        """
+        """Contact area (m²) with which a result or parameter is shown as a total; None if it is shown per area."""
         try:
             return self.rig.area_of(name)
         except (NotAvailable, ParameterError):
             return None
 
     def statistics(self) -> dict[str, dict[str, float]]:
-        """Statistics of the finished chunks: shares of kinds; for numbers the range, the share of points with a finite
-        value and, if there are any, of those with an infinite one.
+        """Statistics of the finished chunks by result: share of each kind, or for numbers ``low``, ``high``, ``share``.
+
+        ``share`` is that of points with a finite value, ``infinite`` (if not zero) that of points with an infinite one.
         """
         store = self._store
         pending = store.pending()
@@ -187,7 +186,7 @@ class MapResult(Displayed):
         return found
 
     def _blocks(self, name: str) -> Iterator[np.ndarray]:
-        """Blocks of a result, each of many chunks, without blocks of which nothing is computed."""
+        """Yield the values of a result in blocks of several chunks, without blocks that have no finished chunk."""
         store = self._store
         marks = store.marks_of_grid() != 0
         extra = int(np.prod(store.layout.arrays[name].shape[len(self.dims) :], dtype=int))
@@ -203,7 +202,7 @@ class MapResult(Displayed):
                     yield self.read(name, (*before, along))
 
     def read(self, name: str, region: Any = ...) -> np.ndarray:
-        """Values of a result or parameter.
+        """Values (SI units) of a result or parameter, or of a region of it.
 
         Raises
         ------
@@ -238,7 +237,7 @@ class MapResult(Displayed):
                 and "status" not in self.results
                 and round(found.get("share", 1) + endless, 12) < 1
             ):
-                text += "; compute status as well to know of the rest"
+                text += "; compute status as well to see why the others have none"
             lines.append(f"  {name:<{width}}{text}")
         return "\n".join(lines)
 
@@ -267,7 +266,7 @@ class MapResult(Displayed):
         } | ({"forces": {"area": self.area(next(iter(forces))), "statistics": forces}} if forces else {})
 
     def to_netcdf(self, path: str | PathLike[str]) -> None:
-        """Write one netCDF file; unfinished parts are missing values.
+        """Write one netCDF file, with missing values in unfinished chunks.
 
         Raises
         ------

@@ -1,1 +1,1 @@
-"""Who computes a map: one chunk of it, workers here or on a cluster, and a run from start to end."""
+"""Computation of a map: one chunk of it, workers on this machine or on a cluster, and a run from start to end."""

@@ -1,4 +1,4 @@
-"""Computation of one chunk of a map: read its parameters, compute, store, mark as done; the same on all engines."""
+"""Computation of one chunk of a map, by any worker: read its parameters, compute, store, mark as done."""
 
 from __future__ import annotations
 
@@ -52,10 +52,11 @@ class Done:
     Attributes
     ----------
     number, points : int
+        Number of the chunk, and its number of points.
     seconds : float
-        Time taken; 0 if the chunk was done already.
+        Time taken (s); 0 if the chunk was done already.
     problem : str
-        Reason why it could not be computed; empty if it was.
+        Reason why the chunk could not be computed; empty if it was.
     """
 
     number: int
@@ -73,7 +74,7 @@ def job_of(plan: Map, path: Path) -> Job:
 def do_chunk(job: Job, number: int) -> Done:
     """Compute and store one chunk, unless it is done already.
 
-    Errors are returned as `Done.problem`, because exceptions lose their text on the way through some engines.
+    Errors are returned as `Done.problem`, because some kinds of workers lose the text of exceptions.
     """
     began = time.perf_counter()
     try:
@@ -81,11 +82,11 @@ def do_chunk(job: Job, number: int) -> Done:
             message = f"this worker has steadyslip {version()}, the map was started with {job.version}"
             return Done(number, 0, 0.0, message)
         if not Path(job.path).exists():
-            message = f"a worker does not see {job.path!r}; give a folder that all machines share"
+            message = f"a worker cannot find {job.path!r}; give a folder that all machines share"
             return Done(number, 0, 0.0, message)
         store = _open_store(job.path, _stamp(job.path))
         points = store.points(number)
-        if store.is_done(number):  # by a worker that was believed lost
+        if store.is_done(number):  # a worker that was believed lost has computed it
             return Done(number, points, 0.0)
         region = store.region(number)
         vary = store.parameters(region)
@@ -101,7 +102,7 @@ def do_chunk(job: Job, number: int) -> Done:
         return Done(number, 0, 0.0, str(cannot_write(Path(job.path), error)))
     except SteadyslipError as error:
         return Done(number, 0, 0.0, str(error))
-    except Exception as error:  # of a user's measure
+    except Exception as error:  # a user's measure may raise anything
         place = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{place.name}, line {place.lineno} of {Path(place.filename).name}"
         return Done(number, 0, 0.0, f"chunk {number} failed with {type(error).__name__}: {error} (in {where})")
@@ -112,8 +113,8 @@ def do_chunk(job: Job, number: int) -> Done:
 def reuse_memory() -> None:
     """Make a worker process reuse the memory of arrays instead of returning it to the system.
 
-    Kernels allocate and free arrays of some 100 kB all the time. Dask sets the GNU C library of its workers to return
-    such blocks at once, which doubles the time; this restores the usual behaviour.
+    Kernels constantly allocate and free arrays of some 100 kB. Dask makes the GNU C library of its workers return freed
+    blocks at once, which doubles the time; this restores the default behaviour.
     """
     if platform.libc_ver()[0] != "glibc":
         return
@@ -128,7 +129,7 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD 
 
 @lru_cache(maxsize=4)
 def _open_store(path: str, stamp: tuple[int, int]) -> Store:
-    """Store that stays open from chunk to chunk, until another one is made at its path."""
+    """Opened store, cached between chunks; `stamp` changes when the store is replaced by another at its path."""
     return Store(Path(path))
 
 

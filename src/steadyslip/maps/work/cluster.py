@@ -1,6 +1,6 @@
 """Execution of chunks on a Dask cluster: workers compute and store, this process hands out chunk numbers.
 
-Which chunks are finished is read from the store only, independent of the memory of scheduler and workers.
+The store alone decides which chunks are finished; what scheduler and workers remember does not count.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from steadyslip.maps.store.map_store import Store
 from steadyslip.maps.work.chunk import Done, Job, do_chunk, reuse_memory
 
 LOCAL = "local"
-PATIENCE = 3  # deaths of workers on the same chunk before giving up
+PATIENCE = 3  # number of workers that die on the same chunk before the run is given up
 WAIT = 600.0  # s without a finished chunk before a lost scheduler is given up; restarts take minutes
-COUNT = 5.0  # s between counts of the workers, which may come and go
+COUNT = 5.0  # s between counts of the workers, whose number may change
 RETRY = 2.0  # s between attempts to connect
 CONNECT = 30.0  # s to wait for an answer; Dask's own default
 
 
 class _Lost(Exception):
-    """Error: the scheduler has lost tasks."""
+    """The scheduler has lost tasks."""
 
 
 def run_cluster(
     job: Job, store: Store, chunks: Sequence[int], report: Callable[[Done], None], address: str, workers: int,
     note: Callable[[str], None],
 ) -> None:  # fmt: skip
-    """Compute all chunks on the scheduler at `address`, or on a local cluster made for it (``local``).
+    """Compute all chunks on the Dask scheduler at `address`; ``local`` starts a cluster on this machine.
 
     Raises
     ------
     NotAvailable
-        If Dask is not installed, there is no scheduler, or it does not come back.
+        If Dask is not installed, or the scheduler cannot be reached, or is lost for more than `WAIT`.
     """
     try:
         import distributed
@@ -75,7 +75,7 @@ def run_cluster(
 
 
 def _finished_chunks(client: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
-    """Yield chunks as they finish; two per worker are submitted at a time, independent of the size of the map."""
+    """Yield a report for each chunk as it finishes; at any time two chunks per worker are submitted, not all."""
     from distributed import as_completed
 
     run = uuid.uuid4().hex[:8]
@@ -118,7 +118,7 @@ def _finished_chunks(client: Any, job: Job, chunks: Sequence[int]) -> Iterator[D
 
 
 def _do_chunk(job: Job, number: int) -> Done:
-    """Task of a Dask worker."""
+    """Compute one chunk in a Dask worker."""
     reuse_memory()
     return do_chunk(job, number)
 

@@ -1,4 +1,4 @@
-"""Execution of chunks on the cores of this machine, by processes whose death does no harm."""
+"""Execution of chunks on the cores of this machine, by processes that are replaced if they die."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.progress import interrupts_held
 from steadyslip.maps.work.chunk import Done, Job, do_chunk, reuse_memory
 
-PATIENCE = 8  # deaths of worker pools in a row without a finished chunk before giving up; chosen by trial
+PATIENCE = 8  # worker pools that die in a row without a finished chunk before the run is given up; chosen by trial
 WATCH = 0.5  # s between a worker's checks that its parent is alive
 
 
 def run_here(job: Job, chunks: Sequence[int], report: Callable[[Done], None]) -> None:
-    """Compute all chunks one after the other in this process; Ctrl-C takes effect between them."""
+    """Compute all chunks one after the other in this process; Ctrl-C takes effect between chunks."""
     with interrupts_held() as interrupted:
         for number in chunks:
             done = do_chunk(job, number)
@@ -33,7 +33,7 @@ def run_here(job: Job, chunks: Sequence[int], report: Callable[[Done], None]) ->
 
 
 def run_local(job: Job, chunks: Sequence[int], report: Callable[[Done], None], workers: int) -> None:
-    """Compute all chunks on a number of processes; `report` may raise an exception to stop.
+    """Compute all chunks on several processes; `report` is called for each and may raise an exception to stop.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def run_local(job: Job, chunks: Sequence[int], report: Callable[[Done], None], w
 
 
 def _finished_chunks(pool: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
-    """Yield chunks as they finish; two per worker are submitted at a time."""
+    """Yield a report for each chunk as it finishes; at any time two chunks per worker are submitted."""
     waiting = iter(list(chunks))
     ahead: set[Future[Done]] = set()
     while True:
@@ -100,7 +100,7 @@ def _workers(count: int) -> Iterator[Any]:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Context in which new processes and threads start with Ctrl-C blocked; this process gets it afterwards.
+    """Context in which new processes and threads start with Ctrl-C blocked; this process receives it at the end.
 
     A worker killed by Ctrl-C while it starts would leave the pool waiting for it.
     """
@@ -118,14 +118,14 @@ def _set_up_worker(driver: int) -> None:
     """Set up a worker: Ctrl-C is left to the parent, which ends the workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if "fork" in multiprocessing.get_all_start_methods():
-        # with fork the compressor's lock has no name, which a killed worker would leave behind in the system
+        # without fork the compressor would use a named lock, which a killed worker would leave in the system
         multiprocessing.set_start_method("fork", force=True)
     reuse_memory()
     threading.Thread(target=_exit_with_parent, args=(driver,), daemon=True).start()
 
 
 def _exit_with_parent(driver: int) -> None:
-    """End this worker soon after its parent was killed; it would wait for work forever."""
+    """End this worker soon after its parent has been killed; otherwise it would wait for work forever."""
     while os.getppid() == driver:
         time.sleep(WATCH)
     os._exit(1)

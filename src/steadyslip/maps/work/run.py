@@ -22,7 +22,7 @@ from steadyslip.maps.work.cluster import run_cluster
 from steadyslip.maps.work.local import run_here, run_local
 from steadyslip.motion.engine import available_cores
 
-SHORT = 2.0  # s of work that is done without further processes, which take a second to start
+SHORT = 2.0  # s; less work than this is done in this process, because further ones take a second to start
 
 
 @checked()
@@ -45,7 +45,7 @@ def run_map(
     path : path
         Folder ending in ``.zarr``, created if missing.
     workers : int, optional
-        Number of processes; by default one per core, or only this one for short work.
+        Number of processes; by default one per core, or only the calling process for short work.
     cluster : str, optional
         Compute on Dask: address of a scheduler such as ``tcp://host:8786``, or ``local`` for workers on this machine.
         All workers must have access to `path` and have this package.
@@ -86,7 +86,7 @@ def run_map(
 def _compute_missing(
     plan: Map, store: Store, workers: int | None, cluster: str | None, progress: bool | None
 ) -> MapResult:
-    """Compute the missing chunks of a store."""
+    """Compute the missing and damaged chunks of a store; returns the map."""
     with store.locked():
         store.restore(plan)
         _note_differences(store, plan)
@@ -108,7 +108,7 @@ def _check(cluster: str | None) -> None:
 
 
 def _note_differences(store: Store, plan: Map) -> None:
-    """Print notes on differences that do not prevent continuing."""
+    """Print notes about differences between stored map and `plan` that do not prevent continuation."""
     then = store.versions
     for name, now in versions().items():
         if then.get(name) != now and store.marked() < store.count:
@@ -119,7 +119,7 @@ def _note_differences(store: Store, plan: Map) -> None:
 
 
 def _check_space(store: Store) -> None:
-    """Raise an error if the disk is full; the size of a whole map is unknown before it is compressed."""
+    """Raise an error if the disk is full; the space that the whole map needs is unknown before compression."""
     free = shutil.disk_usage(store.path).free
     if free < 2**16:  # less than the smallest files of a map
         raise NotAvailable(f"cannot write {str(store.path)!r}: the disk is full")

@@ -141,7 +141,7 @@ def test_unknown_function_is_named():
     import sympy as sp
 
     x = sp.Symbol("x", real=True)
-    with pytest.raises(ss.NotAvailable, match=r"zeta.*a law that is to move may use exp, log"):
+    with pytest.raises(ss.NotAvailable, match=r"zeta.*laws in simulations may use exp, log"):
         Formulas([sp.zeta(x)], {x: "y0"})({"y0": 1.0})
 
 

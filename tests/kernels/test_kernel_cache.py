@@ -231,7 +231,7 @@ def test_the_command_line_says_in_one_line_that_nothing_is_kept(folder):
         capture_output=True, text=True,
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr.startswith("warning: machine code cannot be kept in")
+    assert done.stderr.startswith("warning: machine code cannot be cached in")
     assert done.stderr.count("\n") == 1
     assert f"chmod go-w {folder}" in done.stderr
 

@@ -1,13 +1,13 @@
 """Compilation of programs and driver to machine code, cached in the user's cache folder.
 
 The driver is compiled once for all models and calls a model's routines by address; routines are straight-line programs.
-Both go to LLVM as text. Machine code is stored under the hash of that text (or of its source), of all versions that
-matter and of the processor, in one sealed file that is written under a temporary name and moved into place. A file is
-used only if it and its folder belong to this user, nobody else can write to them, and its seal
-(`steadyslip.files.sealed`) is right; otherwise the code is compiled again. The cache is as trustworthy as the user's
-account: code that somebody with the user's rights has changed and sealed anew is run.
-If the folder cannot be written to, nothing is cached, with one warning. ``STEADYSLIP_CACHE`` names another folder;
-empty means no cache. With ``STEADYSLIP_INTERPRET=1`` nothing is compiled, and Python runs everything.
+LLVM gets both as text. Machine code is stored in one sealed file, named by a hash of that text (or of its source), of
+all relevant versions and of the processor; it is written under a temporary name and moved into place. A file is used
+only if it and its folder belong to this user, nobody else can write to them, and its seal
+(`steadyslip.files.sealed`) is valid; otherwise the code is compiled again. The cache is as trustworthy as the user's
+account: code that somebody with the user's rights has changed and sealed again is run.
+If the folder cannot be written to, nothing is cached, with one warning. ``STEADYSLIP_CACHE`` names another folder; an
+empty value means no cache. With ``STEADYSLIP_INTERPRET=1`` nothing is compiled, and Python runs everything.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ ENTRIES: dict[str, tuple[ModuleType, tuple[str, ...]]] = {
          _REALS, _TABLE, "int"),
     ),
 }  # fmt: skip
-"""Functions of the driver called from Python: module, and types of the arguments after layout and routines."""
+"""Functions of the driver that Python calls: module, and types of their arguments after layout and routines."""
 DRIVERS = {"driver": ("advance", "observe", "field", "through_table"), "held": ("bristle_step", "follow_held")}
-"""Entries that are compiled together, by the name of their file: a motion needs none of those of a held rig."""
+"""Groups of `ENTRIES` that are compiled together, by file name; a motion does not need the group for held rigs."""
 KERNEL = FileKind("kernel", 4, 2**26, "it is compiled again")
 _FALSE_WORDS = ("", "0", "no", "off", "false")  # values of an environment variable that mean no
 _KEY_PLACEHOLDER = "THIS"  # placeholder for the key in the routines' text
@@ -75,18 +75,18 @@ _lock = threading.RLock()
 _drivers: dict[str, Callable[..., int]] = {}
 _loaded: dict[str, dict[str, int]] = {}
 _NATIVE = [f"printers.native.{part}" for part in ("functions", "expressions", "lines", "arrays")]
-_TRANSLATION = ("layout", "driver_text", "linking", *_NATIVE)  # modules that driver code depends on, besides its own
+_TRANSLATION = ("layout", "driver_text", "linking", *_NATIVE)  # modules that translate the driver: part of its key
 
 
 @dataclass(frozen=True, eq=False)
 class Code:
-    """Routines of a model with the driver that calls them.
+    """Routines of a model, and the driver functions that call them.
 
     Attributes
     ----------
     layout : Layout
     routines : Routines
-        Addresses, or Python functions if `plain`.
+        Addresses of machine code, or Python functions if `plain`.
     plain : bool
         True if Python runs everything, slowly.
     """
@@ -122,39 +122,39 @@ class Code:
 
     @cached_property
     def bristle_step(self) -> Callable[..., int]:
-        """`steadyslip.kernels.driver.bristles.bristle_step` bound to these bristles."""
+        """`steadyslip.kernels.driver.bristles.bristle_step` bound to this model."""
         return self._bound("bristle_step")
 
     @cached_property
     def follow_held(self) -> Callable[..., int]:
-        """`steadyslip.kernels.driver.holding.follow_held` bound to these bristles."""
+        """`steadyslip.kernels.driver.holding.follow_held` bound to this model."""
         return self._bound("follow_held")
 
 
 def interpreting() -> bool:
-    """True if STEADYSLIP_INTERPRET asks for Python instead of machine code."""
+    """True if the environment variable STEADYSLIP_INTERPRET requests Python instead of machine code."""
     return os.environ.get("STEADYSLIP_INTERPRET", "").strip().lower() not in _FALSE_WORDS
 
 
 def interpreted(programs: Sequence[Program], layout: Layout) -> Code:
-    """Programs as Python functions: slow, for tests and for stepping through."""
+    """Code with programs as Python functions: slow, for tests and debuggers."""
     functions = {program.name: python.function(program, interpreting()) for program in programs}
     return Code(layout, Routines(**{name: functions.get(name, _missing_routine) for name in Routines._fields}), True)
 
 
 def _missing_routine(record: Any, number: float, array: Any) -> None:
-    raise NotImplementedError("this kernel has no such routine")
+    raise NotImplementedError("the driver called a routine that this kernel does not have; this is a bug, report it")
 
 
 def compiled(programs: Sequence[Program], layout: Layout) -> Code:
-    """Programs as machine code, compiled now or read from the cache."""
+    """Code with programs as machine code, compiled now or read from the cache."""
     addresses = machine_code(programs, layout.lanes)
     found = {name: addresses.get(name, 0) for name in Routines._fields}
     return Code(layout, Routines(**cast(Any, found)), False)
 
 
 def code_of(programs: Sequence[Program], layout: Layout, plain: bool) -> Code:
-    """Programs as Python functions if `plain`, else as machine code."""
+    """Code with programs as Python functions if `plain`, else as machine code."""
     return (interpreted if plain else compiled)(programs, layout)
 
 
@@ -162,7 +162,7 @@ def code_of(programs: Sequence[Program], layout: Layout, plain: bool) -> Code:
 
 
 def cache_folder() -> Path | None:
-    """Folder of the cache; None if there is none."""
+    """Folder of the kernel cache; None if caching is switched off."""
     chosen = os.environ.get("STEADYSLIP_CACHE")
     if chosen is not None:
         return Path(chosen).expanduser() if chosen else None
@@ -173,7 +173,7 @@ def cache_folder() -> Path | None:
 
 @lru_cache(maxsize=1)
 def _versions() -> str:
-    """Versions and processor that machine code depends on."""
+    """Text with all versions, and the processor, on which machine code depends."""
     return "\n".join([RELEASE, sys.version, np.__version__, *linking.surroundings()])
 
 
@@ -183,12 +183,12 @@ def _key(source: str) -> str:
 
 @dataclass(frozen=True)
 class _CachedFile:
-    """Bytes cached in one sealed file; always absent without a path."""
+    """Bytes cached in one sealed file; without a path nothing is cached."""
 
     path: Path | None
 
     def read(self) -> bytes | None:
-        """Content, if the file is intact and nobody else could have written it; else None."""
+        """Content of the file; None if it is missing or damaged, or another user could have written it."""
         if self.path is None:
             return None
         try:
@@ -221,15 +221,15 @@ def _reason(error: OSError) -> str:
 
 @cache
 def _warn_of(folder: Path, why: str, owner: int = -1) -> None:
-    """Warn once why nothing is cached in a folder and what to do; only in the first of several processes."""
+    """Warn once per folder that nothing is cached, with reason and remedy; worker processes do not warn."""
     if multiprocessing.parent_process() is not None:
         return
     mend = ""
     if owner >= 0 and owner == os.getuid():
-        mend = f"take that right from them (chmod go-w {shlex.quote(str(folder))}), or "
+        mend = f"remove their right to write (chmod go-w {shlex.quote(str(folder))}), or "
     warnings.warn(
-        f"machine code cannot be kept in {str(folder)!r} ({why}): every start compiles it anew, which takes seconds; "
-        f"{mend}name another folder in STEADYSLIP_CACHE (an empty name: keep none, and say nothing)",
+        f"machine code cannot be cached in {str(folder)!r} ({why}): every start compiles it anew, which takes seconds; "
+        f"{mend}name another folder in STEADYSLIP_CACHE (an empty name: no cache, no warning)",
         NotKeptWarning, stacklevel=2,
     )  # fmt: skip
 
@@ -243,7 +243,7 @@ def _file(key: str, name: str) -> _CachedFile:
 
 
 def machine_code(programs: Sequence[Program], lanes: int) -> dict[str, int]:
-    """Addresses of programs, by name, compiled or from the cache."""
+    """Addresses of the machine code of programs, by name, compiled now or read from the cache."""
     names = [program.name for program in programs]
     text = assembly(programs, lanes, {name: f"{name}.{_KEY_PLACEHOLDER}" for name in names}, linking.pointer())
     key = _key(text)
@@ -257,7 +257,7 @@ def machine_code(programs: Sequence[Program], lanes: int) -> dict[str, int]:
 def cached_or_compiled(
     text: Callable[[], str], key: str, what: str, names: Sequence[str], effort: int = linking.SPEED
 ) -> dict[str, int]:
-    """Addresses of functions ``name.key`` of assembly: from a file of the cache, or compiled and cached."""
+    """Addresses, by name, of functions with symbols ``name.key``: read from the cache, or compiled and cached."""
     file = _file(key, what)
     symbols = {name: f"{name}.{key}" for name in names}
     content = file.read()
@@ -271,7 +271,7 @@ def cached_or_compiled(
 
 
 def driver(name: str) -> Callable[..., int]:
-    """One of `ENTRIES` as machine code; takes layout and addresses of routines as arrays, then its other arguments."""
+    """Machine code of one of `ENTRIES` as a Python function of layout, addresses of routines (arrays), and the rest."""
     with _lock:
         if name not in _drivers:
             (group,) = (one for one, names in DRIVERS.items() if name in names)
@@ -283,7 +283,7 @@ def driver(name: str) -> Callable[..., int]:
 
 
 def driver_text(key: str, group: str) -> str:
-    """Assembly of one of `DRIVERS`."""
+    """LLVM assembly of one group of `DRIVERS`, with symbols ``name.key``."""
     entries = {name: (_WHOLE, _WHOLE, *ENTRIES[name][1]) for name in DRIVERS[group]}
     return translated(_driver_modules(group), entries, {name: f"{name}.{key}" for name in entries}, 2, linking.opaque())
 
@@ -294,21 +294,21 @@ def _driver_modules(group: str) -> dict[str, str]:
 
 @lru_cache(maxsize=len(DRIVERS))
 def driver_key(group: str = "driver") -> str:
-    """Hash of everything that the machine code of one of `DRIVERS` depends on."""
+    """Hash of everything on which the machine code of one group of `DRIVERS` depends."""
     declared = [f"{name} {ENTRIES[name][1]}" for name in DRIVERS[group]]
     others = [text_of(f"steadyslip.kernels.{part}") for part in _TRANSLATION]
     return _key("\n".join([*declared, *_driver_modules(group).values(), *others]))
 
 
 def callable_at(address: int, name: str, types: Sequence[str]) -> Callable[..., int]:
-    """Python function that calls a translated function without holding the interpreter's lock."""
+    """Python function that calls the translated function at an address, without the interpreter's lock (GIL)."""
     kinds = [ctypes.py_object if "[" in one else ctypes.c_int64 for one in types]
     function = ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(address)
 
     def called(*arguments: Any) -> int:
         found: int = function(*arguments)
         if found < 0:
-            raise TypeError(f"{name}: argument {-found} is not an array {types[-1 - found]} in one piece")
+            raise TypeError(f"{name}: argument {-found} must be a contiguous, writeable array {types[-1 - found]}")
         return found
 
     return called

@@ -39,7 +39,7 @@ STEP = (
         0.3111643669578199, -0.1521609496625161, 0.20136540080403034, 0.04471061572777259,
     ),
 )  # fmt: skip
-"""Weights of the earlier stages in the argument of each; the last row gives the result."""
+"""Weights of the earlier stages in the argument of each stage; the last row gives the result."""
 EXTRA = (
     (
         0.056167502283047954, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25350021021662483, -0.2462390374708025, -0.12419142326381637,
@@ -54,7 +54,7 @@ EXTRA = (
         0.3567271874552811, 0.0, 0.0, 0.0, -0.0013990241651590145, 2.9475147891527724, -9.15095847217987,
     ),
 )  # fmt: skip
-"""Weights of the earlier stages in the arguments of the stages for dense output."""
+"""Weights of the earlier stages in the arguments of the three stages that only dense output needs."""
 ERROR = (
     0.01312004499419488, 0.0, 0.0, 0.0, 0.0, -1.2251564463762044, -0.4957589496572502, 1.6643771824549864,
     -0.35032884874997366, 0.3341791187130175, 0.08192320648511571, -0.022355307863886294, 0.0,
@@ -63,7 +63,7 @@ LOWER_ERROR = (
     -0.18980075407240762, 0.0, 0.0, 0.0, 0.0, 4.450312892752409, 1.8915178993145003, -5.801203960010585,
     -0.4226823213237919, -0.1521609496625161, 0.20136540080403034, 0.02265179219836082, 0.0,
 )  # fmt: skip
-"""Weights of the stages in the two error estimates."""
+"""Weights of the stages in the error estimates: ERROR of order 5, LOWER_ERROR of order 3."""
 DENSE = (
     (
         -8.428938276109013, 0.0, 0.0, 0.0, 0.0, 0.5667149535193777, -3.0689499459498917, 2.38466765651207,
@@ -86,4 +86,4 @@ DENSE = (
         96.32455395918828, -39.17726167561544, -149.72683625798564,
     ),
 )  # fmt: skip
-"""Weights of all stages, the extra ones included, in the last four terms of the dense output."""
+"""Weights of all stages, including the extra ones, in the last four terms of the dense output."""

@@ -1,4 +1,4 @@
-"""Source text of the driver's modules for the compilers, with names of enum members replaced by numbers."""
+"""Source text of the driver's modules for the translators, and syntax trees with numbers in place of enum members."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ENUMS = {
     for enum in (Row, Setting, Cursor, Status, EventPlace, Kind, Sampled, Recorded, Final, Out, Held, Control, Turn)
 }
 _IMPORTED = re.compile(rf"^from ({re.escape(DRIVER)}\.\w+) import ", re.MULTILINE)
-"""Imports of a driver's module: parsing all of them for these would take a twentieth of a verdict's time."""
+"""Matches imports of driver modules; parsing the modules to find them would take a twentieth of a verdict's time."""
 _TUPLES: dict[str, Any] = {"layout": Layout, "routines": Routines}
 
 
@@ -42,7 +42,7 @@ def text_of(module: str) -> str:
 
 
 def texts(*modules: str) -> dict[str, str]:
-    """Source text of driver modules and, before each, of those that it imports, by module name."""
+    """Source text of driver modules by name; the modules that a module imports precede it."""
     found: dict[str, str] = {}
     for module in modules:
         _gather(module, found)

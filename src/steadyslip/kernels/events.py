@@ -1,8 +1,8 @@
 """Events of a motion, declared once for single runs and ensembles, log and statistics.
 
-An event is a sign change of a function of the observables. The step of each kernel compares its values at both ends;
-the driver finds the moment on the dense output and logs it. Where there is no log, extremes of velocity and begin of
-slip, which are frequent, are found in all lanes at once (`steadyslip.kernels.watch`).
+An event is a sign change of a function of the observables. The step of each kernel compares the function's values at
+both ends; the driver finds the time by dense output and logs the event. Without a log, frequent events (extremes of
+velocity, begin of slip) are found in all lanes at once (`steadyslip.kernels.watch`).
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from typing import Any
 from steadyslip.kernels.layout import Out, Row
 from steadyslip.kernels.nodes import larger
 
-FASTER = 1.000001  # slip is faster than the load point by this factor, so that rounding at equal speeds is no event
+FASTER = 1.000001  # least ratio of slip to load-point speed, so that rounding at equal speeds causes no event
 ROUNDED = 64 * 2.0**-52
-"""Rounding error of a sum of stresses over aσ, the change of friction per unit of ln v; stresses are dozens of aσ."""
+"""Relative rounding error of the velocity: that of a sum of stresses (dozens of aσ), over aσ, the stress per unit of
+ln v."""
 
 
 @dataclass(frozen=True)
@@ -31,15 +32,15 @@ class Observed:
     v_lp : Node
         Velocity of the load point.
     v_low, sigma_low : Node
-        Velocity below which the block counts as arrested; normal stress below which contact is lost.
+        Velocity (m/s) below which the block counts as arrested; normal stress (Pa) below which contact is lost.
     h : Node
         Length of the step, s.
     outputs : callable
-        Function that computes all outputs of the contact.
+        Function without arguments that computes all outputs of the contact.
     error : Node
         Error of the velocity that the integration allows in a step, m/s.
     rounding : Node
-        Size up to which the acceleration may be rounding, m/s².
+        Possible rounding error of the acceleration, m/s².
     """
 
     contact: int
@@ -56,12 +57,12 @@ class Observed:
 
     @property
     def tau(self) -> Any:
-        """Shear stress of the contact."""
+        """Shear stress of the contact, Pa."""
         return self.outputs()[Out.TAU]
 
     @property
     def T(self) -> Any:  # noqa: N802 -- the theory's letter
-        """Stress of the spring."""
+        """Stress of the spring, Pa."""
         return self.outputs()[Out.T]
 
 
@@ -73,14 +74,14 @@ class Watched:
     ----------
     name : str
     function : callable
-        Of an `Observed`.
+        Function of an `Observed` that returns a number, as a Node.
     falls, rises : str
         Name of the event when the function becomes negative, or positive; empty if it is not logged.
     falls_counted, rises_counted : str
-        Column of an ensemble's statistics that counts it; empty for none.
+        Column of an ensemble's statistics that counts the event; empty for none.
     uncertain : callable, optional
-        Size up to which the sign is unknown, because of the integration error or rounding. A sign counts from the first
-        step on at whose end the function is larger, until it is as clearly the other one.
+        Function of an `Observed` that returns the size up to which the sign is unknown, because of integration error or
+        rounding. The sign changes only at the end of a step where the function is larger than that.
     """
 
     name: str
@@ -93,7 +94,7 @@ class Watched:
 
 
 def faster(at: Observed) -> Any:
-    """Speed above which the block slips, forward or backward, m/s."""
+    """Speed (m/s) above which a contact counts as slipping, forward or backward."""
     return larger(FASTER * abs(at.v_lp), at.v_low)
 
 
@@ -108,12 +109,12 @@ EVENTS = (
     Watched("motion", lambda at: abs(at.v) - at.v_low, falls="arrest", rises="restart", falls_counted="arrests",
             uncertain=lambda at: at.error),
 )  # fmt: skip
-"""All events; the driver uses the first four by index (`steadyslip.kernels.layout.Kind`)."""
+"""All events; the driver treats the first four specially (`steadyslip.kernels.layout.EventPlace`)."""
 LOG_KINDS = ("", *(word for event in EVENTS for word in (event.falls, event.rises)), "blow-up")
-"""Names of the kinds in a log: 2 e + 1 where event function e falls, 2 e + 2 where it rises."""
+"""Names of the kinds of log rows by number: 2 e + 1 where event function e falls, 2 e + 2 where it rises."""
 COUNTED = tuple(word for event in EVENTS for word in (event.falls_counted, event.rises_counted))
-"""Columns of event counts after those of `Row`, by kind; columns without a name are not reported."""
+"""Names of the event counts, by kind, that follow the statistics of `Row`; unnamed counts are not reported."""
 RING = "ring"
-"""Name of forward slip after a slip event that is told beside it; in a log a begin of slip with number 0."""
+"""Name of ringing, forward slip after a slip event that is no event; in a log, a begin of slip with number 0."""
 TALLY = (*(row.name.lower() for row in Row if Row.EVENTS <= row <= Row.PEAK_GROWTH), *COUNTED)
 """Columns of the event statistics in results."""

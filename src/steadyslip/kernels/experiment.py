@@ -1,9 +1,8 @@
-"""Kernel for comparison with an experiment: friction and its derivatives in several directions.
+"""Kernel for comparison with an experiment: friction and its derivatives in several directions of parameter space.
 
-Measured histories have a breakpoint at every sample. Lanes with breakpoints of their own would spend most time there;
-lanes that share the samples of one record enter each row of the table together, take steps of their own size and wait
-for the last one. The observable and its derivatives in several directions are interpolated at every sample by dense
-output.
+Measured histories have a breakpoint at every sample. Lanes with separate breakpoints would spend most time there.
+Here lanes share the samples of one record: they enter each row of the table together, take steps of their own size and
+wait for the last lane. The observable and its derivatives are interpolated at every sample by dense output.
 """
 
 from __future__ import annotations
@@ -33,14 +32,15 @@ from steadyslip.model.variational import with_directions
 
 
 class LockstepKernel(Formulation):
-    """Writer of the programs of one lockstep kernel.
+    """Programs of one lockstep kernel, whose lanes follow one table row by row.
 
     Parameters
     ----------
     reduction : Reduction
-        From `with_directions`, massless models in the form *explicit* or *implicit*: the state is continuous.
+        Result of `with_directions`; for massless models of form *explicit* or *implicit*, so that the state is
+        continuous.
     choice : Choice
-        Of level ``linear``, not dense.
+        Options with level ``linear``, without dense output.
     observed : sympy.Expr
         Observable in terms of state, unknowns and inputs.
     """
@@ -52,7 +52,7 @@ class LockstepKernel(Formulation):
         super().__init__(reduction, choice)
 
     def _write(self) -> None:
-        self.counted = self.own  # the error norm averages without sensitivities, which have tolerances of their own
+        self.counted = self.own  # the error norm averages over the state without sensitivities
         super()._write()
         self.full = self.rates
         expression = self._with_constants(self.observed)
@@ -88,7 +88,7 @@ class LockstepKernel(Formulation):
         return self._step(), self._rates_program(), self._see_program(), self._extend_program(), self._look_program()
 
     def _step(self) -> Program:
-        """One step; a lane at the end of the row stays as it is."""
+        """Program of one step; a lane at the end of the row does not change."""
         step = Step(self)
         step.advance()
         step.store_stages()
@@ -112,18 +112,18 @@ class LockstepKernel(Formulation):
         return record.program
 
     def _see_program(self) -> Program:
-        """Observable and derivatives at the current state."""
+        """Program that computes observable and derivatives at the current state."""
         record = Evaluator(self, Program("see_lanes"))
         return self._seen(record, record.point(record.program.load(Row.TAU)))
 
     def _extend_program(self) -> Program:
-        """Polynomials of the dense output of the last step."""
+        """Program that computes the polynomials of the dense output of the last step."""
         record = Evaluator(self, Program("extend_lanes"))
         record.store_polynomials()
         return record.program
 
     def _look_program(self) -> Program:
-        """Observable and derivatives at `Row.NEXT_TIME`, within the last step."""
+        """Program that computes observable and derivatives at `Row.NEXT_TIME`, within the last step."""
         record = Evaluator(self, Program("look_lanes"), extended=True)
         load = record.program.load
         moment = load(Row.NEXT_TIME)
@@ -139,13 +139,13 @@ class LockstepKernel(Formulation):
         return record.program
 
     def input_rates(self) -> tuple[int, ...]:
-        """Indices of the rates of change of inputs among the constants, by direction and input; -1 if absent."""
+        """Index among the constants of each input's rate of change, direction by direction; -1 for inputs without."""
         order = {pair: len(self.constants.symbols) + i for i, pair in enumerate(self.constants.rates)}
         directions = range(len(self.reduction.directions))
         return tuple(order.get((c, d), -1) for d in directions for c in self.varied_inputs)
 
 
-LANES = 8  # one vector of doubles; more would exceed the registers, which sensitivities fill
+LANES = 8  # one vector of doubles: sensitivities fill the registers, so that more lanes would not fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,13 +155,14 @@ class ExperimentProgram:
     Attributes
     ----------
     reduction : Reduction
-        Without sensitivities.
+        Equations without sensitivities.
     directions : int
+        Number of directions in parameter space for derivatives.
     method : str
     settled : bool
         True if motions begin with steady sliding.
     observed : str or None
-        Name of the memory variable that is observed instead of friction.
+        Name of the memory variable that is observed; None for the friction coefficient.
     """
 
     reduction: Reduction
@@ -182,7 +183,7 @@ class ExperimentProgram:
 
     @property
     def _measured_stress(self) -> sp.Expr:
-        """Normal stress (Pa) by which records divide; with pores the pressure around, not yet drained, is measured."""
+        """Normal stress (Pa) by which records divide friction; with pores the applied stress, before it has drained."""
         contact, channels = self.reduction.model.contact, self.reduction.channels
         if contact.outside is None:
             return self.reduction.outputs["sigma"]
@@ -200,11 +201,11 @@ class ExperimentProgram:
 
     @cached_property
     def unsettled(self) -> dict[str, sp.Symbol]:
-        """Free deviations of the start from steady sliding, by name: friction (spring force), then memory variables."""
+        """Symbols, by name, of free initial deviations from steady sliding: friction, then memory variables."""
         if self.settled:
             return {}
         model = self.reduction.model
-        own = [item for item in model.memory if item.unit == "1"]  # a memory of normal stress starts settled
+        own = [item for item in model.memory if item.unit == "1"]  # memories of normal stress start in steady state
         return {"friction": inner_symbol("initial_friction", real=True)} | {
             item.name: inner_symbol(f"initial_{item.symbol.name}", real=True) for item in own
         }
@@ -222,9 +223,9 @@ class ExperimentProgram:
 
     @cached_property
     def _values(self) -> tuple[Any, ArrayFunction]:
-        """Constants and starting values with derivatives in every parameter (σss following) and every deviation.
+        """Indices of nonzero derivatives, and function that computes constants, initial values and these derivatives.
 
-        Indices of the derivatives that are not zero, and the function that computes values and these derivatives.
+        The derivatives are with respect to every parameter (with the change of σss) and every initial deviation.
         """
         model = self.reduction.model
         expressions = [*self.kernel.constants.symbols, *self._start]
@@ -241,7 +242,7 @@ class ExperimentProgram:
         return np.array(places, dtype=int), model.function(wanted, *self.unsettled.values())
 
     def arrays(self, point: OperatingPoint, chain: np.ndarray, away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Constants with their rates of change, and starting states with theirs, one row per job.
+        """Constants with their rates of change, and initial states with their rates of change, one row per job.
 
         Parameters
         ----------
@@ -269,7 +270,7 @@ class ExperimentProgram:
 def experiment_program(
     model: Model, directions: int, method: str, settled: bool = True, observed: str | None = None
 ) -> ExperimentProgram:
-    """Kernel for a model (cached)."""
+    """ExperimentProgram for a model (cached)."""
     own = model.contact.name
     presses = () if model.contact.outside is None else (own, own + PORES)
     return ExperimentProgram(

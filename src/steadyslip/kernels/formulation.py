@@ -1,8 +1,8 @@
 """Formulas of one reduced Model for one method, and the layout of its record.
 
-A single trajectory is limited by latency: each stage of a step begins with the result of the last one. Where an
-expression is linear in an exponential e (or other slow function) of the state, it is rewritten as A e + B: A and B are
-computed while e is, and one multiplication and addition are left to wait for.
+A single trajectory is limited by latency: each stage of a step needs the result of the last stage. An expression that
+is linear in an exponential e (or another slow function) of the state is rewritten as A e + B: A and B are computed in
+parallel with e, so that only one multiplication and addition follow.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ OUTPUTS = ("v", "acceleration", "sigma", "tau", "T")
 
 @dataclass(frozen=True)
 class Choice:
-    """Options that a kernel is compiled for.
+    """Options for which a kernel is compiled.
 
     Attributes
     ----------
@@ -42,9 +42,9 @@ class Choice:
     harmonics : int
         Harmonic terms per input (level ``harmonic``).
     lanes : int
-        Trajectories side by side.
+        Number of trajectories that are integrated in parallel.
     dense : bool
-        True to keep stages for dense output (events, samples).
+        True to store stages for dense output (events, samples).
     """
 
     method: str
@@ -64,8 +64,8 @@ class Formulation:
     size : int
         Length of the state.
     moving : list of int
-        Indices in the state of the variables that velocities of contacts depend on; only for implicit methods with
-        dense output, whose rates at the end of a step have an error of their own (`steadyslip.kernels.step`).
+        Indices of the state variables on which velocities of contacts depend. Only for implicit methods with dense
+        output, whose rates at the end of a step have an error that is corrected (`steadyslip.kernels.step`).
     """
 
     varied_inputs: tuple[sp.Symbol, ...] = (V_LP,)  # inputs with rates of change; the steady drive is a constant too
@@ -93,24 +93,24 @@ class Formulation:
 
     @cached_property
     def elimination(self) -> list[int]:
-        """Indices of the state in the order of elimination: parts of late signals first, which fill in least."""
+        """State indices in order of elimination: first the variables of delayed signals, which cause least fill-in."""
         past = {item.symbol for item in self.reduction.model.past}
         return sorted(range(self.size), key=lambda i: self.reduction.state[i] not in past)
 
     @property
     def _inputs(self) -> dict[sp.Symbol, str]:
-        """Names in programs of the input channels, their slopes and time."""
+        """Names used in programs for the input channels, their slopes and time, by symbol."""
         channels = {s: f"in{i}" for i, s in enumerate(self.reduction.channels)}
         return channels | {s: f"slope{i}" for i, s in enumerate(self.reduction.slopes)} | {TIME: "time"}
 
     def _with_constants(self, expression: sp.Expr) -> sp.Expr:
-        """Expression with parameter-only parts as constants, and slopes zero where inputs are constant."""
+        """Expression with parameter-only parts replaced by constants, and slopes of constant inputs by zero."""
         if self.choice.level == "constant":
             expression = expression.xreplace(dict.fromkeys(self.reduction.slopes, sp.Integer(0)))
         return self.constants.with_constants(expression)
 
     def _rates_with_constants(self) -> dict[int, sp.Expr]:
-        """Terms that a change of the constants adds to the rates of `Reduction.direction`, by index in the state."""
+        """Terms that changing constants add to the rates of sensitivities, by index in the state; also adds them."""
         reduction = self.reduction
         found = {
             reduction.state.index(symbol): self._change(self._rates[i], direction)
@@ -121,7 +121,7 @@ class Formulation:
         return found
 
     def _change(self, expression: sp.Expr, direction: int) -> sp.Expr:
-        """Rate of change of an expression in constants and state with the constants, at a given state."""
+        """Derivative of an expression in a direction of parameter space, by constants and unknowns, at fixed state."""
 
         def explicit(e: sp.Expr) -> sp.Expr:
             known = [*self.constants.symbols.values(), *self.varied_inputs]
@@ -130,7 +130,7 @@ class Formulation:
         return explicit(expression) + self._solved.followed(expression, list(map(explicit, self._solved.residuals)))
 
     def _entry(self, matrix: list[list[sp.Expr]], i: int, k: int) -> sp.Expr:
-        """Entry of the Jacobian, with the terms of changing constants."""
+        """Entry (i, k) of the Jacobian, with the terms due to changing constants."""
         entry = self._with_constants(matrix[i][k])
         if i not in self.driven:
             return entry
@@ -140,19 +140,19 @@ class Formulation:
 
     @cached_property
     def _solved(self) -> Unknowns:
-        """Unknowns and residuals in terms of constants."""
+        """Unknowns and their residuals, written with constants in place of parameters."""
         return Unknowns(self.reduction.unknowns, tuple(map(self._with_constants, self.reduction.residuals)))
 
     @staticmethod
     def named(z: Sequence[Value]) -> dict[str, Value]:
-        """Values of the unknowns by their names in formulas."""
+        """Values of the unknowns by their names in formulas, z0, z1, ..."""
         return {f"z{k}": value for k, value in enumerate(z)}
 
     def _formulas(self, expressions: Sequence[sp.Expr]) -> Formulas:
         return Formulas(expressions, self.names)
 
     def _write(self) -> None:
-        """Write all formulas; their order numbers the constants."""
+        """Make all formulas; constants are numbered in the order in which these use them."""
         reduction, n = self.reduction, self.size
         seen = [[self._with_constants(one.outputs[name]) for name in OUTPUTS] for one in reduction.slidings]
         outputs = [e for one in seen for e in one]
@@ -203,15 +203,13 @@ class Formulation:
         return len(self.reduction.slidings)
 
     def _shares(self, index: int) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-        """Shares of a contact in steady sliding: slip rate over the drive's and over the first contact's, σ
-        over its σ.
-        """
+        """Ratios of a contact in steady sliding: slip rate to the drive's, slip rate and σ to the first contact's."""
         one, first = self.reduction.slidings[index], self.reduction.slidings[0]
         stresses = [contact.sigma_ss for contact in self.reduction.model.contacts]
         return one.ratio, one.ratio / first.ratio, stresses[index] / stresses[0]
 
     def _write_velocity(self) -> None:
-        """Write velocity as a function of w alone and w of velocity, for one contact whose w is integrated."""
+        """Make formulas for velocity from w alone and for w from velocity, for one contact whose w is integrated."""
         reduction = self.reduction
         self.speed: Formulas | None = None
         self.limit: Formulas | None = None
@@ -232,7 +230,7 @@ class Formulation:
 
     @property
     def terms(self) -> int:
-        """Number of coefficients of a variable's dense output."""
+        """Number of polynomial coefficients of a variable's dense output."""
         return len(self.method.dense) + 2 if self.method.implicit else len(self.method.dense[0]) + 1
 
     def _made_layout(self) -> Layout:
@@ -266,13 +264,13 @@ __all__ = ["with_short_chains"]
 
 
 def with_short_chains(expressions: Iterable[sp.Expr], variables: Iterable[sp.Symbol]) -> list[sp.Expr]:
-    """Rewrite expressions as linear in functions of `variables` wherever they are linear in them.
+    """Expressions rewritten as A s + B wherever they are linear in a slow function s (exponential, ...) of `variables`.
 
     Parameters
     ----------
     expressions : iterable of sympy.Expr
     variables : iterable of sympy.Symbol
-        Symbols that the slow functions depend on: the velocity variables.
+        Symbols on which the slow functions depend: the velocity variables.
     """
     written, late = list(expressions), frozenset(variables)
     names: list[tuple[sp.Symbol, sp.Expr]] = []
@@ -287,7 +285,7 @@ def with_short_chains(expressions: Iterable[sp.Expr], variables: Iterable[sp.Sym
 
 
 def _innermost(expressions: Iterable[sp.Expr], late: frozenset[sp.Symbol]) -> sp.Expr | None:
-    """First function found that depends on `late` symbols and has no such function in its argument; None if none."""
+    """First function found that depends on `late` symbols, innermost first; None if there is none."""
     for expression in expressions:
         for node in sp.postorder_traversal(expression):
             is_slow = isinstance(node, sp.Function) and not isinstance(node, (AppliedUndef, sp.Piecewise))
@@ -304,7 +302,7 @@ class _Collector:
         self._known: dict[sp.Basic, tuple[sp.Expr, sp.Expr] | None] = {}
 
     def collected(self, e: sp.Basic) -> sp.Basic:
-        """Expression with each maximal part that is linear in s written as A s + B."""
+        """Expression in which each maximal part that is linear in s is written as A s + B."""
         if not e.has(self.symbol) or e is self.symbol:
             return e
         linear = self.linear(e)

@@ -1,4 +1,4 @@
-"""Programs of one reduced Model and one method: a step, and those that the driver calls state_at_fraction steps.
+"""Programs of one reduced Model and one method: a step, and the programs that the driver calls between steps.
 
 One call of `step` advances every lane by one step of its own size, without branches, so that it becomes vector code.
 Rare work (breakpoints, events, samples, the end) is done by the driver, lane by lane, with the other programs. A single
@@ -22,7 +22,7 @@ from steadyslip.protocol.creep import FREE, SWITCH
 
 
 class Kernel(Formulation):
-    """Writer of the programs of one kernel."""
+    """Programs of one kernel of a reduced Model."""
 
     @cached_property
     def programs(self) -> tuple[Program, ...]:
@@ -40,7 +40,7 @@ class Kernel(Formulation):
     # -- the step
 
     def _step(self) -> Program:
-        """One step of every lane, from loading to the flag that calls the driver."""
+        """Program of one step of every lane; it sets the flag of lanes that need the driver."""
         step = Step(self)
         step.advance()
         step.keep()
@@ -90,7 +90,7 @@ class Kernel(Formulation):
             program.store(first + Out.PLACE, place, "y")
             program.store(first + Out.SHARE, share, "y")
         if self.choice.dense:
-            if self.speed is not None:  # velocity peaks where the dense output of w does
+            if self.speed is not None:  # take the acceleration's sign from the slope of w's dense output
                 seen[1] = program.load(n + Out.W_SLOPE, "y")
             for e, value in enumerate(record.event_values(record.moments(point, seen))):
                 program.store(event_functions_at(self.layout) + e, value, "y")
@@ -113,9 +113,9 @@ class Kernel(Formulation):
         return record.program
 
     def _balance_program(self) -> Program:
-        """Balances after a jump as functions of their w: values, slopes in their own w, Newton's changes of all w.
+        """Program of the balances after a jump: values, derivatives in their own w, and Newton's changes of all w.
 
-        Without a balance to solve the velocity is continuous, and a dummy balance is zero.
+        If there is no balance to solve, the velocity is continuous, and the program writes a dummy balance of zero.
         """
         record = Evaluator(self, Program("balance"))
         program = record.program
@@ -135,7 +135,7 @@ class Kernel(Formulation):
         return program
 
     def _place_program(self) -> Program:
-        """State from the continuous variables and the velocity variables that balances fix."""
+        """Program that composes the state from the continuous variables and the velocity variables of the balances."""
         program, reduction = Program("place"), self.reduction
         fixed = [w for w, _ in reduction.restarts]
         for i, symbol in enumerate(reduction.state):
@@ -147,7 +147,10 @@ class Kernel(Formulation):
         return program
 
     def _shift_program(self) -> Program:
-        """Jump of the load point: variables fall behind by their shares; before it, a drive is let go or taken up."""
+        """Program of a jump of the load point: variables change by their shares of it.
+
+        Before that, the force of a drive that is released or attached is updated (`_let_go`).
+        """
         record = Evaluator(self, Program("shift"))
         program = record.program
         if self.reduction.letting_go:
@@ -160,7 +163,10 @@ class Kernel(Formulation):
         return program
 
     def _speed_up(self, record: Evaluator) -> None:
-        """New velocity variables of bodies on which the drive slides: its velocity jumps, and theirs go on."""
+        """Update velocity variables, which are relative to the drive, so that bodies' velocities are continuous.
+
+        It concerns bodies that slide on the drive when the velocity of the drive jumps.
+        """
         program, reduction = record.program, self.reduction
         values = record.constants | {f"k{i}": program.load(self.layout.continuous + i) for i in range(self.layout.kept)}
         steady, *_ = self.sped(values | {"jump": 0.0})
@@ -171,7 +177,7 @@ class Kernel(Formulation):
             program.store(self.layout.continuous + reduction.continuous.index(symbol), value)
 
     def _let_go(self, record: Evaluator) -> None:
-        """New held force of a drive that is let go or moved: continuous, or as prescribed, from the state before it."""
+        """Update the held force of a drive that is released or attached, from the state before it."""
         program, (held,) = record.program, self.reduction.model.held
         names = {symbol: f"in{i}" for i, symbol in enumerate(self.reduction.channels)}
         free, switch = (names[self.reduction.channels[place]] for place in (FREE, SWITCH))
@@ -185,7 +191,7 @@ class Kernel(Formulation):
         program.store(place, new)
 
     def _extend_program(self) -> Program:
-        """Polynomials of the dense output of the last step."""
+        """Program that computes the polynomials of the dense output of the last step."""
         record = Evaluator(self, Program("extend"))
         record.store_polynomials()
         return record.program

@@ -1,8 +1,8 @@
 """Indices of all quantities in the arrays that kernels and driver share.
 
-A *record* holds one trajectory: first the numbers of `Row`, at the same index for every model, then groups whose sizes
-depend on model and method, from the indices in `Layout`. Kernels of several lanes interleave their records: row
-``row`` of lane ``l`` is ``S[row * lanes + l]``.
+A *record* is the array of numbers of one trajectory: first those of `Row`, at the same index for every model, then
+groups whose sizes depend on model and method, which begin at the indices in `Layout`. Kernels of several lanes
+interleave their records: row ``row`` of lane ``l`` is ``S[row * lanes + l]``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ GROUP = 8
 
 
 class Row(IntEnum):
-    """Rows of a record that every kernel has."""
+    """Rows of a record that all kernels have."""
 
     V, ACCELERATION, SIGMA = 0, 1, 2
     """Outputs at the end of the step."""
@@ -32,7 +32,7 @@ class Row(IntEnum):
     ACTIVE, FLAG, GOOD = 12, 13, 14
     """Flags: lane has a job, lane needs the driver, last step was accepted."""
     ACCEPTED, REJECTED, FAILURES, ERROR = 15, 16, 17, 18
-    """Numbers of accepted and rejected steps, and of rejected ones in a row; ln of the last squared error."""
+    """Numbers of accepted steps, of rejected steps, and of rejected steps in a row; ln of the last squared error."""
     MOST_STEPS, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 19, 20, 21, 22, 23, 24
     """Settings: most steps, limits of velocity (m/s) and normal stress (Pa); flags: watch events, record steps."""
     NEXT_TIME, NEXT_SAMPLE = 25, 26
@@ -47,45 +47,46 @@ class Row(IntEnum):
     """Number of events in the last step."""
     W_LIMIT, W_LP = 34, 35
     """Velocity variable at the slip limit and at the load-point velocity, valid while inputs are constant."""
-    # statistics of slip events (s, m, Pa, m/s, Hz); those up to PEAK_GROWTH are results, of the last complete event
+    # statistics of slip events (s, m, Pa, m/s, Hz); up to PEAK_GROWTH they are results, about the last complete event
     EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 36, 37, 38
     EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 39, 40, 41, 42, 43, 44
     EVENT_RINGS, EVENT_RING_FREQUENCY, LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 45, 46, 47, 48, 49
-    # largest drop; begins of the last events in each direction; T and slip at the begin of the last, and its last ring
+    # size of the last velocity peak; load point's displacement; largest stress drop; begin of the last event in each
+    # direction; then of the last event: T and slip at its begin, begin of its last ring
     PEAK_SIZE, LOAD_MOVED, LARGEST_DROP, FORWARD_BEGIN, BACKWARD_BEGIN = 50, 51, 52, 53, 54
     EVENT_STRESS, EVENT_X, LAST_RING = 55, 56, 57
-    # slip in progress that may become a slip event, with its sign: state at its lowest speed
+    # slip in progress: lowest speed, 1 if fast, highest speed, begin, sign; then the state at its lowest speed
     NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN, NOW_SIGN = 58, 59, 60, 61, 62
     NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 63, 64, 65, 66, 67, 68
-    # end of the last fast forward slip; of those too small for an event, each after a rest: number and last drop
+    # end of the last fast forward slip; number and last stress drop of similar small slips after rests (`ALIKE`)
     FAST_END, SMALL_COUNT, SMALL_DROP = 69, 70, 71
     Z_OLD = 72
     """First unknown of the balances at the start of the last step."""
     H_OLD = 73
     """Size of the last accepted step."""
     PULL, STRETCH = 74, 75
-    """Force (less that of steady sliding) of a drive that is let go and moves on, at the end of the last segment, and
-    the part of it that the drive's own motion would cause with the load point at rest."""
+    """At the end of the last segment: force (minus that of steady sliding) of a drive that can be released, and the
+    part of it that the drive's own motion would cause with the load point at rest."""
     LOAD_SPEED = 76
-    """Velocity of the load point at the end of the last segment, kept where its jump moves velocity variables."""
+    """Velocity of the load point at the end of the last segment, stored if its jumps change velocity variables."""
 
 
 TALLIED = Row.SMALL_DROP - Row.EVENTS + 1
-"""Number of rows of event statistics, EVENTS to SMALL_DROP; further contacts have theirs in a group of their own."""
+"""Number of rows of event statistics, EVENTS to SMALL_DROP; those of further contacts are in a separate group."""
 
 
 MOST_FAILURES = 400.0
-"""Rejected steps in a row after which a job stops. A stopping block with mass slows down by hundreds of decades in a
-moment, and steps have to shrink as much."""
+"""Rejected steps in a row after which a job stops. The velocity of a stopping block with mass falls by hundreds of
+decades almost at once, and steps have to shrink as much."""
 EVENT_SHARE = 0.1
-"""Least drop of a slip event, as a share of the largest so far, and least reload between two events: what changes the
-force by less is ringing. Any share between the largest ring of a damped block (some hundredths) and the drop of a full
-event tells the two apart; a tenth is far from both."""
+"""Smallest stress drop of a slip event over the largest so far, and smallest reload between two events; smaller changes
+are ringing. Any value between the largest ring of a damped block (some hundredths) and 1, a full event, separates the
+two; a tenth is far from both."""
 RESTED = 3.0
-"""Least time of rest before a slip over its own duration, that tells it from ringing, whose rests are at most twice as
-long: at a peak of SLIP_EVENT times the load point's velocity a sine is faster than it for a third of the period."""
-ALIKE = 3.0  # slips in a row, each after a rest and within EVENT_SHARE of each other, that are events after a knock
-SLIP_EVENT = 2.0  # least ratio of peak velocity to load-point velocity of a slip event: stick-slip of a block on a
+"""Smallest rest before a slip over the slip's duration that distinguishes it from ringing, whose rests are at most
+twice as long: a sine that peaks at SLIP_EVENT times the load-point velocity exceeds that for a third of the period."""
+ALIKE = 3.0  # number of small slips in a row, each after a rest and with similar drops, that count as slip events
+SLIP_EVENT = 2.0  # smallest ratio of peak velocity to load-point velocity of a slip event: stick-slip of a block on a
 # spring with constant friction exceeds 2 (see docs/explanation/motion.md)
 
 
@@ -93,17 +94,17 @@ class Out(IntEnum):
     """Indices of a contact's outputs, counted from the end of the state."""
 
     V, ACCELERATION, SIGMA, TAU, T, V_LP, ADVANCE, W_SLOPE, UNKNOWN, PLACE, SHARE, COUNT = range(12)
-    """V_LP is the load-point velocity times the contact's share of it, ADVANCE the load point's displacement since the
-    start of the segment. W_SLOPE is the derivative of the dense output of the velocity variable and UNKNOWN a guess of
-    the first unknown of the balances; both are inputs of the routine `outputs`. PLACE is the distance slipped since the
-    start of the run, SHARE the slip rate in steady sliding over that of the first contact. Each further contact has
-    COUNT numbers; then follow event functions, further observables and guesses of further unknowns. `observe` returns
-    those up to ADVANCE."""
+    """V_LP is the load-point velocity times the contact's steady slip rate over the drive's velocity, ADVANCE the load
+    point's displacement since the start of the segment, times the same ratio. W_SLOPE is the derivative of the dense
+    output of the velocity variable, and UNKNOWN a guess of the first unknown of the balances; both are inputs of the
+    routine `outputs`. PLACE is the distance slipped since the start of the run, SHARE the slip rate in steady sliding
+    over that of the first contact. Each contact has COUNT numbers; event functions, additional observables and guesses
+    of further unknowns follow. `observe` returns the outputs up to ADVANCE."""
 
 
 class Setting(IntEnum):
-    """Columns of the settings of a trajectory; absolute tolerances of the state, then guesses and scales of further
-    unknowns follow."""
+    """Columns of the settings of a trajectory. From ATOL on: absolute tolerances of the state, then guesses and scales
+    of further unknowns."""
 
     RTOL, MOST_STEPS, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 0, 1, 2, 3, 4, 5, 6
     GUESS, Z_SCALE, FIRST_STEP, V_DRIVE, ATOL = 7, 8, 9, 10, 11
@@ -113,13 +114,13 @@ SETTINGS = tuple(setting.name.lower() for setting in Setting if setting < Settin
 
 
 class Cursor(IntEnum):
-    """Elements of the array that carries the progress of a series of calls of `advance`."""
+    """Elements of the array with the progress of a series of calls of `advance`."""
 
     NEXT_JOB, LAST_JOB, BUSY, PAUSED, LOGGED, RECORDED, FIRST_JOB, SIZE = 0, 1, 2, 3, 4, 5, 6, 7
 
 
 class Status(IntEnum):
-    """End of a trajectory."""
+    """Status of a trajectory: running, or the reason of its end."""
 
     RUNNING, DONE, CONTACT_LOST, BLOW_UP, TOO_MANY_STEPS, STUCK, NO_VELOCITY = 0, 1, 2, 3, 4, 5, 6
 
@@ -133,7 +134,7 @@ class EventPlace(IntEnum):
 class Kind(IntEnum):
     """Kind of a row of the log: 2 e + 1 where event function e falls through zero, 2 e + 2 where it rises.
 
-    Events of further contacts have higher numbers, in the same order.
+    For contact c the number of kinds per contact is added c times.
     """
 
     SLIP_ENDS, SLIP_BEGINS, PEAK, TROUGH, LOST, BACKWARD_ENDS, BACKWARD_BEGINS, ARREST = 1, 2, 3, 4, 5, 7, 8, 9
@@ -142,12 +143,12 @@ class Kind(IntEnum):
 LOG_COLUMNS = 9
 """Columns of the log: kind, time, v, sigma, tau, T, slip, segment, number of the slip event (0 for ringing)."""
 NUMBER = 8
-"""Column of the number. An end with a number that has had one before continues that event; a number begins anew at 1
-where all slip before was small."""
+"""Column with the number of the slip event. A second end with the same number means that the event has continued.
+Numbers start again at 1 if all earlier slip turns out to be small."""
 
 
-# A *point* is the full state at a moment: first unknown of the balances, state, further unknowns. Unknowns are stored
-# because the state alone does not determine them where forces balance at several velocities.
+# A *point* is the full state at one time: first unknown of the balances, state, further unknowns. Unknowns are stored
+# because the state alone does not determine them if forces balance at several velocities.
 
 
 class Sampled(IntEnum):
@@ -169,46 +170,48 @@ class Final(IntEnum):
 
 
 class Held(IntEnum):
-    """Elements of the array that carries the motion of a held rig through calls of `follow_held`."""
+    """Elements of the array with the progress of a held rig's motion over calls of `follow_held`."""
 
     TIME, END, STOP = 0, 1, 2
-    """Now, end of the target's segment, and the next sample or change of force (s)."""
+    """Present time, end of the target's segment, and time of the next sample or change of force (s)."""
     LENGTH, RTOL, SHORTEST = 3, 4, 5
-    """With bristles: next step (s), error allowed in it relative to the size of a variable, least step (s)."""
+    """With bristles: length of the next step (s), allowed error relative to a variable's size, shortest step (s)."""
     CHANGED, STEPS, MOST_STEPS = 6, 7, 8
-    """Flag: the force has changed since the last span; number of steps or passages, and the one to stop at."""
+    """Flag: the force has changed since the last span; number of steps or passages so far, and at most."""
     ROWS, EVERY = 9, 10
-    """Rows of the motion written, and nodes of a step from one to the next."""
+    """Number of rows of the motion written so far; every EVERY-th node of a step is written."""
     RESTS, SINCE, LAST_ROW = 11, 12, 13
-    """Flag: at rest under a sampled controller; since when, and time of the last row (s)."""
+    """Flag: at rest under a sampled controller; begin of the rest (s), time of the last row (s)."""
     LOWEST, HIGHEST, FASTEST = 14, 15, 16
-    """Extremes of error and speed of the stroke."""
+    """Lowest and highest error (m or rad) and highest speed (m/s or rad/s) of the stroke."""
     STILL, PACE, FAR = 17, 18, 19
-    """Share of a speed (PACE, or the stroke's fastest) up to which what moves may be at rest; error (m or rad) from
-    which on it is no hunting any more."""
+    """Speeds below STILL times the larger of PACE (m/s or rad/s) and FASTEST may mean rest; from the error FAR (m or
+    rad) on the motion is no longer hunting."""
     SIZE = 20
 
 
 class Control(IntEnum):
-    """Elements of the array of a sampled controller: its settings, then what it remembers."""
+    """Elements of the array of a sampled controller: its settings, then its memory."""
 
     PERIOD, RESOLUTION, DELAY, ON_MEASUREMENT = 0, 1, 2, 3
-    """PERIOD is 0 of a controller without samples, which is a part of the linear system."""
+    """PERIOD is 0 for a controller without sampling, which is part of the linear system."""
     BAND, BANDS_RATE, OF_INTEGRAL = 4, 5, 6
     INTEGRAL, MOST_INTEGRAL, MOST_FORCE = 7, 8, 9
     COUNT, AIM, LATE, CONSTANT = 10, 11, 12, 13
-    """Samples so far, last target, forces that wait; flag: the last sample changed neither integral nor force."""
+    """Number of samples so far, last target, number of delayed forces; flag: last sample changed nothing."""
     ROUNDED = 14
-    """Number of loops, from the first on, whose place is that of the encoder."""
+    """Number of loops, from the first on, whose place is measured by the encoder and rounded to its step."""
     SIZE = 15
 
 
 class Turn(IntEnum):
-    """What `follow_held` leaves to its caller."""
+    """Reason why `follow_held` returns, and what its caller has to do.
+
+    LOOK: decide whether to continue. STEP: take the next step, in which a guard may fail. LENGTH: provide a passage for
+    the time to `Held.STOP`. STUCK: stop, because steps have become too short.
+    """
 
     LOOK, STEP, LENGTH, STUCK = 0, 1, 2, 3
-    """Whether to go on; a step in which a guard may fail; a passage over the time to `Held.STOP`; steps that become too
-    short."""
 
 
 class Layout(NamedTuple):
@@ -218,7 +221,7 @@ class Layout(NamedTuple):
     size: int
     """Length of the state."""
     kept: int
-    """Number of variables that jumps leave unchanged."""
+    """Number of variables that are continuous in jumps."""
     constants: int
     inputs: int
     """Number of input channels: load-point velocity, pushes, normal stresses."""
@@ -227,24 +230,22 @@ class Layout(NamedTuple):
     stages: int
     """Number of stages kept for dense output; 0 without it."""
     extra: int
-    """1 if dense output needs stages of its own: methods of high order, whose steps are long."""
+    """1 if dense output needs additional stages: methods of high order, whose steps are long."""
     contacts: int
     events: int
     """Number of event functions of all contacts; 0 without dense output."""
     further: int
-    """Number of further observables."""
+    """Number of additional observables."""
     watched: int
     """1 if frequent events are found in all lanes at once."""
     massless: int
     """Number of balances solved after a jump, for unknowns and velocity variables."""
     unknowns: int
-    """Number of unknowns that balances fix at every moment."""
+    """Number of unknowns that are determined by balances at all times."""
     solved: int
-    """1 if the balances have to be solved to restore the variables that jumps leave unchanged."""
+    """1 if the balances have to be solved to get the continuous variables from the state."""
     w: int
-    """Index in the state of the (first) velocity variable that balances fix after a jump; -1 if none is in the
-    state.
-    """
+    """Index in the state of the (first) velocity variable that balances determine after a jump; -1 if there is none."""
     own: int
     """Length of the state without sensitivities."""
     directions: int
@@ -257,7 +258,7 @@ class Layout(NamedTuple):
     level: int
     """Inputs at the start of the segment."""
     slope: int
-    """Slopes of the inputs; then amplitudes, angular frequencies and phases of their waves."""
+    """Slopes of the inputs; the next three groups are amplitudes, angular frequencies and phases of their waves."""
     amplitude: int
     omega: int
     phase: int
@@ -265,29 +266,29 @@ class Layout(NamedTuple):
     state_old: int
     stage: int
     polynomial: int
-    """Dense output of the last step: per variable, coefficients of powers of the fraction of the step."""
+    """Dense output of the last step: for each variable, coefficients of powers of the fraction of the step."""
     rate_error: int
-    """Errors of the rates at the end of the step, of the variables that velocities depend on; of implicit methods."""
+    """For implicit methods: errors of the rates, at the end of the step, of variables on which velocities depend."""
     event_value: int
     """Values of the event functions at the end of the step."""
     sign_change: int
-    """Sign changes of event functions in the last step: 1 rose, -1 fell."""
+    """Sign changes of event functions in the last step: 1 for rising, -1 for falling, 0 for none."""
     event_count: int
     """Number of events so far, by kind."""
     observable: int
     rate_before: int
     guess: int
-    """Guesses of further unknowns and of velocity variables that balances fix."""
+    """Guesses of further unknowns and of velocity variables that balances determine."""
     scale: int
     """Scales of further unknowns."""
     unknown_old: int
     """Further unknowns at the start of the last step."""
     further_contact: int
-    """Per further contact: velocity, then normal stress and velocity as shares of the first contact's."""
+    """For each further contact: velocity, then normal stress and velocity over their ratios to the first contact."""
     further_statistics: int
     """Event statistics of further contacts."""
     before_jump: int
-    """Per contact: velocity before a jump, and whether it slipped."""
+    """For each contact: velocity before a jump, and its `slip_sense` then."""
     rows: int
 
 
@@ -297,7 +298,7 @@ def make_layout(
     directions: int = 0, x: int = 0, seen: int = 0, events: int = 0, watched: bool = False, extra: bool = False,
     contacts: int = 1, further: int = 0, moving: int = 0,
 ) -> Layout:  # fmt: skip
-    """Layout with the groups of the record one after the other."""
+    """Layout for given sizes, with the groups of the record one after the other."""
     waves, further_ones = inputs * harmonics, max(massless, unknowns, 1) - 1
     sizes = {
         "state": size, "rate": size, "continuous": kept, "atol": size, "level": inputs, "slope": inputs,
@@ -329,27 +330,28 @@ Routine = Callable[[Array, float, Array], None]
 class Routines(NamedTuple):
     """Straight-line functions of one model, each ``(record, number, array) -> None``.
 
-    The driver takes Python functions, or their addresses when it is compiled.
+    The driver gets Python functions, or their addresses when it is compiled.
 
     Attributes
     ----------
     step : one step of every lane
     rates : rates, outputs and event functions at the record's state
-    outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`, then event functions; reads
-        guesses of the unknowns from ``array[size + Out.UNKNOWN]`` and its last elements, and writes the unknowns there
-    restore : variables that a jump leaves unchanged, from the record's state; adds the load point's displacement
-    shift : these variables after a jump of the load point by `number`
-    place : the record's state from these variables and the velocity variables that balances fix
-    balance : ``array`` = residuals of the balances that are solved after a jump at the guesses, their slopes in
+    outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at time `number` in the segment, then event
+        functions; reads guesses of the unknowns from ``array[size + Out.UNKNOWN]`` and the last elements of ``array``,
+        and writes the unknowns there
+    restore : continuous variables (unchanged by jumps) from the record's state; adds the load point's displacement
+    shift : continuous variables after a jump of the load point by `number`
+    place : the record's state from the continuous variables and the velocity variables that balances determine
+    balance : ``array`` = residuals, at the guesses, of the balances that are solved after a jump, their slopes in
         their own unknowns, and Newton's changes
     dense : ``array[:size]`` = state at the fraction `number` of the last step, with `Out.W_SLOPE` and unknowns
     extend : polynomials of the dense output of the last step, which `dense` reads
     watch_group : frequent events within the last step, for `GROUP` lanes from lane `number` on
     rates_lanes, see_lanes : rates; observables (all lanes)
     extend_lanes, look_lanes : `extend`; observables at `Row.NEXT_TIME`, within the last step (all lanes)
-    bristles : of a held rig, whose record is constants: ``array`` = slip rates and memories of its m contacts, then
-        friction forces and rates of the memories, then their slopes; after the slip rate of a contact that a load
-        presses comes its normal stress
+    bristles : for a held rig, whose record is its constants: ``array`` = inputs (slip rates and memories of the m
+        contacts, with the normal stress after the slip rate if it varies), then friction forces and rates of the
+        memories, then their slopes in the inputs
     """
 
     step: Routine

@@ -1,4 +1,4 @@
-"""Compilation of LLVM assembly to machine code, and its loading into this process."""
+"""Compilation of LLVM assembly to machine code, and loading of machine code into this process."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from steadyslip.kernels.printers.native.lines import MEMORY, Lines
 SPEED = 3
 """Optimisation level of LLVM for the driver."""
 STRAIGHT = 1
-"""Optimisation level for routines of a model: same machine code, byte for byte, in less time."""
+"""Optimisation level of LLVM for a model's routines: gives the same machine code as level 3 in less time."""
 _MAGIC = (b"\x7fELF", b"\xcf\xfa\xed\xfe")  # first bytes of ELF (also on Windows, for code in memory) and Mach-O
 FEATURES: list[str] = []
-"""Processor features to use, or not (``-``), besides those that LLVM detects: for benchmarks."""
+"""Processor features to use (``+name``) or not (``-name``) besides those that LLVM detects; set by benchmarks."""
 
 
 def opaque() -> bool:
@@ -26,12 +26,12 @@ def opaque() -> bool:
 
 
 def pointer() -> str:
-    """Type of a pointer to a real number in the assembly of this LLVM."""
+    """Type of a pointer to a double in the assembly of this LLVM version."""
     return Lines(opaque()).pointer("real")
 
 
 def surroundings() -> list[str]:
-    """Versions and processor that machine code depends on."""
+    """Versions, processor and settings of LLVM on which machine code depends."""
     import llvmlite
     import llvmlite.binding as llvm
 
@@ -55,7 +55,7 @@ def _target() -> Any:
 
 
 def _new_target() -> Any:
-    """Target machine of LLVM: this processor."""
+    """LLVM target machine for this processor."""
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
@@ -70,7 +70,7 @@ def _new_target() -> Any:
 
 @lru_cache(maxsize=1)
 def _engine() -> Any:
-    """Execution engine of LLVM, which loads machine code into memory."""
+    """LLVM execution engine, which loads machine code into memory (cached)."""
     import llvmlite.binding as llvm
 
     for name in MEMORY:
@@ -86,14 +86,14 @@ def _head(machine: Any) -> str:
 
 
 def machine_code(text: str, effort: int = SPEED) -> bytes:
-    """Object file of a module of assembly."""
+    """Object file (bytes) compiled from a module of LLVM assembly."""
     import llvmlite.binding as llvm
 
     machine = _target()
     module = llvm.parse_assembly(_head(machine) + text)
     module.verify()
     options = llvm.create_pipeline_tuning_options(speed_level=effort)
-    # fast code has no loops or is written as vectors; optimising the driver's loops would take half of the compile time
+    # code that must be fast has no loops or is vector code; optimising the driver's loops would double compile time
     options.loop_unrolling = options.loop_vectorization = options.loop_interleaving = False
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
@@ -101,12 +101,12 @@ def machine_code(text: str, effort: int = SPEED) -> bytes:
 
 
 def is_machine_code(content: bytes, symbols: Iterable[str]) -> bool:
-    """True if bytes look like an object file with these functions (LLVM would end the process if they were not)."""
+    """True if `content` looks like an object file with these functions; LLVM would crash on anything else."""
     return content.startswith(_MAGIC) and all(symbol.encode() in content for symbol in symbols)
 
 
 def linked(code: bytes, symbols: Mapping[str, str]) -> dict[str, int]:
-    """Addresses of functions of an object file, which stays in memory until the process ends."""
+    """Addresses, by name, of functions of an object file, which stays in memory until the process ends."""
     import llvmlite.binding as llvm
 
     engine = _engine()

@@ -52,9 +52,7 @@ Known = dict[Tree, np.ndarray]
 
 
 def _weights(tree: Tree, alpha: np.ndarray, beta: np.ndarray, known: Known) -> np.ndarray:
-    """Elementary weight of a tree for each stage; a node with one branch uses β, which has the linear part,
-    others α.
-    """
+    """Elementary weight of a tree for each stage; nodes with one branch use β (with the linear part), others α."""
     if tree not in known:
         through = beta if len(tree) == 1 else alpha
         product = np.ones(len(alpha))
@@ -67,7 +65,7 @@ def _weights(tree: Tree, alpha: np.ndarray, beta: np.ndarray, known: Known) -> n
 def order_defect(
     b: np.ndarray, alpha: np.ndarray, beta: np.ndarray, order: int, theta: float = 1.0, known: Known | None = None
 ) -> float:
-    """Largest violation of an order condition up to `order`, for the result at t0 + theta h."""
+    """Largest violation of the order conditions up to `order` by the weights b, for the result at t0 + theta h."""
     worst, known = 0.0, {} if known is None else known
     for nodes in range(1, order + 1):
         for tree in rooted_trees(nodes):
@@ -84,18 +82,18 @@ class Method:
     ----------
     name : str
     order, error_order, dense_order : int
-        Of the result, of the embedded result, and of the dense output.
+        Order of the result, of the embedded result, and of the dense output.
     a, c : tuple of tuple of float
-        Explicit: a_ij (the last row gives y1) and nothing. Rosenbrock: A_ij and C_ij; from the stage after
-        the last row of A on, each argument is the one before plus the newest stage, and so is y1.
-        An explicit method may have rows beyond that of y1, of stages that only its dense output needs.
+        Explicit: a_ij (the last row gives y1), and c is empty. Rosenbrock: A_ij and C_ij; after the last row of A, the
+        argument of each stage, and y1, is the previous argument plus the newest stage. An explicit method may have
+        rows after that of y1, for stages that only its dense output needs.
     error : tuple of float
         Weights of the stages in the error estimate.
     lower_error : tuple of float
-        The same of a second estimate e of lower order, which makes E² / sqrt(E² + e²/100) of the first, E, as DOP853
-        does; empty for none.
+        Weights of the stages in a second error estimate e of lower order; the error is then E² / sqrt(E² + e²/100)
+        with the first estimate E, as in DOP853. Empty for none.
     lower_order : int
-        Of the second embedded result.
+        Order of the second embedded result.
     dense : tuple of tuple of float
         Explicit: b_i(θ) = Σ_j dense[i][j] θ^(j+1), extra stages included. Rosenbrock: rows of the polynomial
         (1−θ) y0 + θ (y1 + (1−θ)(r_1 + θ (r_2 + ...))) with r_j = Σ dense[j][i] u_i.
@@ -142,12 +140,12 @@ class Method:
 
     @property
     def all_stages(self) -> int:
-        """Number of stages including those of dense output alone."""
+        """Number of stages, including those that only dense output needs."""
         return self.stages if self.implicit else len(self.a)
 
     @cached_property
     def dense_stages(self) -> tuple[int, ...]:
-        """Indices of the stages that dense output depends on."""
+        """Indices of the stages on which dense output depends."""
         if self.implicit:
             return tuple(range(self.stages))
         rows = self._full(list(self.a))[self.stages :]

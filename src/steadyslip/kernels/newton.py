@@ -1,4 +1,4 @@
-"""Newton's method for the unknowns of a Model within a straight-line program: a fixed number of iterations."""
+"""Newton's method with a fixed number of iterations for the unknowns of a Model, within a straight-line program."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from steadyslip.core.errors import InternalError
 from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.nodes import Loop, Node, Value, as_node, larger, select, smaller
 
-NEWTON_STEPS = 6  # iterations from the guess of the last stage; chosen by trial: each costs as much as the residuals
-MAX_LOG_STEP = 2.0  # largest change of ln v (or asinh v) in one iteration; chosen by trial, against overshoot
+NEWTON_STEPS = 6  # iterations, starting from the last stage's solution; chosen by trial: each evaluates the residuals
+MAX_LOG_STEP = 2.0  # largest change of ln v (or asinh v) in one iteration; chosen by trial to prevent overshoot
 
-RTOL, ATOL = 1e-7, 1e-9  # of z and of its scale: last change of a converged unknown, whose error is near its square
+RTOL, ATOL = 1e-7, 1e-9  # converged if the last change is below RTOL |z| + ATOL scale; the error is near its square
 
 
 def solved(
     kernel: Formulation, given: Mapping[str, Value], near: Sequence[Value], scales: Sequence[Value]
 ) -> list[Value]:
-    """Unknowns at given values by a fixed number of Newton iterations; all NaN where these do not converge."""
+    """Values of the unknowns by Newton's method from the guesses `near`; all NaN if it does not converge."""
     residuals, n = kernel.residuals, kernel.unknowns
     if residuals is None:
-        raise InternalError("residuals where there are unknowns")
+        raise InternalError("a kernel with unknowns to have residuals")
     clamped = _clamped(kernel)
 
     def improved(*z: Node) -> tuple[Sequence[Value], Sequence[Value]]:
@@ -43,7 +43,7 @@ def solved(
 
 
 def _clamped(kernel: Formulation) -> list[int]:
-    """Indices of unknowns that are a logarithm (or asinh) of a velocity, whose steps are limited."""
+    """Indices of the unknowns that are a logarithm (or asinh) of a velocity; their Newton steps are limited."""
     reduction = kernel.reduction
     variables = [one.variable for one in reduction.slidings if one.variable is not None]
     own = {variable.w for variable in variables if variable.kind != "linear"}
@@ -51,9 +51,7 @@ def _clamped(kernel: Formulation) -> list[int]:
 
 
 def eliminated(matrix: Mapping[tuple[int, int], Value], right: Sequence[Value]) -> list[Value]:
-    """Solution of linear equations by elimination with partial pivoting; entries absent from `matrix` are exact
-    zeros.
-    """
+    """Solution of linear equations by elimination with partial pivoting; entries missing in `matrix` are zero."""
     n, right = len(right), list(right)
     rows = [{k: value for (i, k), value in matrix.items() if i == row} for row in range(n)]
     for k in range(n):
@@ -70,7 +68,7 @@ def eliminated(matrix: Mapping[tuple[int, int], Value], right: Sequence[Value]) 
                 rows[i][c] = select(swapped, top.get(c, 0.0), bottom.get(c, 0.0))
             right[k], right[i] = select(swapped, right[i], right[k]), select(swapped, right[k], right[i])
         if k not in rows[k]:
-            raise InternalError("equations that fix their unknowns")
+            raise InternalError("equations that determine all unknowns; the matrix is structurally singular")
         for i in below:
             if k not in rows[i]:
                 continue

@@ -1,8 +1,8 @@
-"""Straight-line programs: typed operations in order of definition, and the array elements that they store.
+"""Straight-line programs: typed operations in order of definition, and stores of results to array elements.
 
-A `Node` is one operation. Arithmetic on nodes makes nodes, so that a method's step written as ordinary Python becomes a
-program when it is run once; a printer (`printers/`) turns that into code. There are selections instead of branches and
-no calls except to the listed primitives, so that every target, vector code included, takes the same program.
+A `Node` is one operation. Arithmetic on nodes makes new nodes, so that running an integration step written as ordinary
+Python once records it as a program; a printer (`printers/`) converts the program to code. Programs have selections in
+place of branches and no calls except to the listed primitives, so that one program serves all targets, vectors as well.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ class Node:
     ----------
     op : str
     args : tuple
-        Nodes; for the leaves (``number``, ``load``, ``argument``, ``carried``) a value or an address.
+        Operands, which are nodes; for ``number``, ``load``, ``argument`` and ``carried`` a value or address.
     kind : str
         ``real``, ``int`` or ``bool``.
     loop : Loop or None
-        The loop in which it is computed.
+        Loop in which the node is computed.
     operands : tuple of Node
-        Nodes in `args`, to be computed before.
+        Nodes in `args`, which must be computed first.
     order : int
-        Position in the order in which nodes were made.
+        Serial number: nodes are numbered in order of creation.
     """
 
     __slots__ = ("args", "kind", "loop", "op", "operands", "order")
@@ -89,23 +89,23 @@ def as_node(value: Any, kind: str = "real") -> Node:
     return Node("number", (int(value) if kind == "int" else bool(value) if kind == "bool" else float(value),), kind)
 
 
-# -- operations without an operator: on nodes they make nodes, on numbers they compute
+# -- functions for operations without a Python operator: nodes give a new node, numbers give a number
 
 
 def select(condition: Any, value: Any, other: Any) -> Any:
-    """`value` where the condition holds, else `other`."""
+    """`value` where the condition is true, else `other`."""
     if not isinstance(condition, Node):
         return value if condition else other
     return Node("select", (condition, as_node(value), as_node(other)))
 
 
 def larger(a: Any, b: Any) -> Any:
-    """Maximum of two values; `a` where `b` is NaN, as Python's max."""
+    """Maximum of two values; `a` where `b` is NaN, like Python's max."""
     return select(b > a, b, a)
 
 
 def smaller(a: Any, b: Any) -> Any:
-    """Minimum of two values; `a` where `b` is NaN, as Python's min."""
+    """Minimum of two values; `a` where `b` is NaN, like Python's min."""
     return select(b < a, b, a)
 
 
@@ -129,15 +129,15 @@ def weighted(weights: Iterable[float], terms: Iterable[Value]) -> Value:
 
 
 class Loop:
-    """Loop with a fixed number of rounds, which carry values from one round to the next.
+    """Loop with a fixed number of rounds; its carried values change from round to round.
 
     Attributes
     ----------
     rounds : int
     start, carried, following : tuple of Node
-        Values before the first round, as a round sees them, and as it leaves them.
+        Carried values: before the first round, at the start of a round, and at its end.
     results : tuple of Node
-        What is wanted of the last round.
+        Values from the last round that are used after the loop.
     """
 
     def __init__(self, rounds: int, start: Sequence[Value], body: Callable[..., tuple[Any, Any]]) -> None:
@@ -158,13 +158,13 @@ class Loop:
 
     @cached_property
     def given(self) -> list[Node]:
-        """Nodes needed before the first round."""
+        """Nodes outside the loop that must be computed before the first round."""
         wanted = [*self.following, *self.results, *(a for node in self.nodes for a in node.operands)]
         return [*self.start, *(node for node in wanted if node.loop is None)]
 
 
 def reachable(ends: Iterable[Node]) -> list[Node]:
-    """Nodes that `ends` depend on, and `ends`, in order of definition; loops before them count as one node."""
+    """Nodes in `ends` and all nodes on which they depend, in order of definition, without nodes inside loops."""
     found: dict[int, Node] = {}
     waiting = list(ends)
     while waiting:
@@ -180,7 +180,7 @@ def reachable(ends: Iterable[Node]) -> list[Node]:
 class Program:
     """Function ``(record, number, array) -> None`` as a straight-line program.
 
-    Loads see the record as it was when the function was called.
+    All loads read the arrays as they were when the function was called.
     """
 
     name: str
@@ -196,9 +196,9 @@ class Program:
         return self._loads[key]
 
     def store(self, place: int, value: Value, array: str = "R") -> None:
-        """Store a value in an element."""
+        """Add a store of a value to element `place` of the record R or of the array y."""
         self.stores.append((array, int(place), as_node(value)))
 
     def nodes(self) -> list[Node]:
-        """Nodes to be computed, in order."""
+        """Nodes that the stores need, in order of computation."""
         return reachable([node for _, _, node in self.stores])

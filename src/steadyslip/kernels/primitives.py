@@ -1,12 +1,12 @@
-"""Elementary functions for kernels, free of branches and calls so that lanes vectorise.
+"""Elementary functions for kernels, without branches and calls so that code for several lanes vectorises.
 
-They take nodes of a program or plain numbers. Except where a docstring gives another bound, each is within 5 units in
-the last place (2^-52 of its value) of the exact function, for every float (measured by
-tests/kernels/test_primitives.py). For all of them:
+Arguments are nodes of a program or plain numbers. Except where a docstring gives another bound, each result is within 5
+units in the last place (2^-52 of its value) of the exact function, for every float (measured by
+tests/kernels/test_primitives.py). Rules for all functions:
 
 - NaN gives NaN; the sign of zero is lost.
-- An exponential is e^700 above 700, so that no step meets an infinity, and 0 below -700, so that x e^-x ends at 0.
-- A logarithm treats arguments from 0 to 2.2e-308 as 2.2e-308: it is finite at zero, and v ln v is 0 at rest.
+- Exponentials are e^700 above 700, so that no step gets an infinity, and 0 below -700, so that x e^-x tends to 0.
+- Logarithms treat arguments from 0 to 2.2e-308 as 2.2e-308, so that they are finite at 0, and v ln v is 0 at rest.
 
 `printers/runtime.js` follows the same rules.
 """
@@ -21,7 +21,7 @@ import numpy as np
 
 from steadyslip.kernels.nodes import Node, larger, select, smaller
 
-ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer that sits in the low bits
+ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer, which the low bits then contain
 _DOUBLE, _LONG = struct.Struct("<d"), struct.Struct("<q")
 ONE = 0x3FF0000000000000  # the bits of 1.0
 LN2_HIGH, LN2_LOW = 0.6931471805598903, 5.497923018708371e-14  # 42 bits of ln 2: n LN2_HIGH is exact for |n| < 2^11
@@ -30,7 +30,7 @@ TINY, HUGE = 2.0**-1022, (2.0 - 2.0**-52) * 2.0**1023  # smallest and largest fl
 LEAST, MOST = 9.859676543759770e-305, 1.0142320547350045e304  # e^-700 and e^700
 LARGE = 2.0**500  # its square does not overflow; for larger z, asinh z = ln 2z to the last bit
 QUARTER = (1.570796325802803, 9.920935774287987e-10, 2.2517417706346578e-18, 3.5215598651832e-27)  # pi/2 as a sum
-FARTHEST = 2.0**45  # spacing of floats there is 1/128: beyond, the angle within a turn is hardly known
+FARTHEST = 2.0**45  # largest angle (rad) of sin and cos: the spacing of floats is 1/128 there
 
 
 def bits(x: Any) -> Any:
@@ -49,7 +49,7 @@ def real(i: Any) -> Any:
 
 
 def _quick(x: Any) -> Any:
-    """Convert a NumPy number to a Python float, several times as fast to compute with; nodes are unchanged."""
+    """Convert a NumPy number to a Python float, which is several times faster in arithmetic; nodes are unchanged."""
     return x if isinstance(x, Node) else float(x)
 
 
@@ -68,7 +68,7 @@ def sqrt(x: Any) -> Any:
 def exp(x: Any) -> Any:
     """e^x to 2.5 units; 0 below -700, e^700 above 700. Degree-13 polynomial on [-ln2/2, ln2/2], Estrin's scheme.
 
-    Each step of a trajectory waits for it: the chain of dependent operations from x to the result is kept short.
+    Each step of a trajectory waits for it, so the chain of dependent operations from x to the result is short.
     """
     x = _quick(x)
     shifted = x * 1.4426950408889634 + ROUND
@@ -87,7 +87,7 @@ def exp(x: Any) -> Any:
 
 
 def expm1(x: Any) -> Any:
-    """e^x - 1; e^700 beyond 700."""
+    """e^x - 1; e^700 above 700."""
     y = exp(x) - 1.0
     s = smaller(larger(x, -0.35), 0.35)
     tail = 1 / 3628800 + s * (1 / 39916800 + s * (1 / 479001600 + s * (1 / 6227020800)))
@@ -97,7 +97,7 @@ def expm1(x: Any) -> Any:
 
 
 def log(x: Any) -> Any:
-    """ln x to 2 units; NaN below zero, ln 2.2e-308 = -708.4 from 0 to there, ln 2^1024 = 709.8 at infinity."""
+    """ln x to 2 units; NaN for x < 0, -708.4 (ln 2.2e-308) from 0 to 2.2e-308, 709.8 (ln 2^1024) at infinity."""
     x = _quick(x)
     y = larger(x, TINY)
     i = bits(y) - 4604544271217802189  # sqrt(1/2): leaves a mantissa in [sqrt(1/2), sqrt(2))
@@ -116,24 +116,24 @@ def log(x: Any) -> Any:
 
 
 def rough_log(x: Any) -> Any:
-    """ln x to within .03, for positive numbers: a float's bits, read as an integer, grow almost like its logarithm.
+    """ln x to within .03, for positive x: a float's bits, read as an integer, grow almost like its logarithm.
 
-    Enough for step sizes, which are a small power of it.
+    That is enough for step sizes, which depend on a small power of x.
     """
     return as_float(bits(_quick(x)) - ONE) * 1.539095918623324e-16 + 0.02983  # ln 2 / 2^52; mean error
 
 
 def log1p(x: Any) -> Any:
-    """ln(1 + x); NaN below -1; at -1 and infinity the values of `log` at zero and infinity."""
+    """ln(1 + x); NaN for x < -1; at -1 and infinity the values of `log` at 0 and infinity."""
     finite = smaller(x, HUGE)
     u = 1.0 + finite
     return log(u) - ((u - 1.0) - finite) / larger(u, TINY)
 
 
 def power(x: Any, y: Any) -> Any:
-    """x^y to 5 + 2 |y ln|x|| units, y finite; for x < 0 defined if y is an integer below 2^50, else NaN.
+    """x^y to 5 + 2 |y ln|x|| units, for finite y; for x < 0 NaN unless y is an integer below 2^50.
 
-    Zero to a positive power is 0; to a negative power, that of 2.2e-308. Results end as those of `exp`.
+    0 to a positive power is 0; to a negative power it is treated as 2.2e-308. Results have the limits of `exp`.
     """
     size, shifted = abs(x), y + ROUND
     turned = select(abs((shifted - ROUND) - y) <= 0.0, select((bits(shifted) & 1) > 0, -1.0, 1.0), math.nan)
@@ -162,7 +162,7 @@ def tanh(x: Any) -> Any:
 
 
 def asinh(x: Any) -> Any:
-    """Inverse hyperbolic sine; at infinity 710.5, that of 2^1024."""
+    """Inverse hyperbolic sine; at infinity 710.5, the value at 2^1024."""
     z = abs(x)
     is_large = z > LARGE
     y = log1p(select(is_large, z, z + z * z / (1.0 + sqrt(1.0 + z * z)))) + select(is_large, LN2, 0.0)
@@ -170,9 +170,9 @@ def asinh(x: Any) -> Any:
 
 
 def asinh_exp(x: Any, y: Any) -> Any:
-    """asinh(x e^y) to 15 units for x = 0 and |x| >= 2.2e-308; smaller |x| count as 2.2e-308 where the result is large.
+    """asinh(x e^y) to 15 units for x = 0 and |x| >= 2.2e-308; smaller |x| count as 2.2e-308 if the result is large.
 
-    Nothing overflows or underflows on the way unless x e^y does.
+    Intermediate values overflow or underflow only if x e^y does.
     """
     z, is_far = abs(x), y < -1400.0  # beyond, e^(y/2) is below the range of `exp`
     half, factor = exp(0.5 * select(is_far, y + 1400.0, y)), select(is_far, LEAST, 1.0)
@@ -183,9 +183,9 @@ def asinh_exp(x: Any, y: Any) -> Any:
 
 
 def _circular(x: Any, quarters: int) -> Any:
-    """Sine of x plus a number of quarter turns, with x reduced by multiples of pi/2.
+    """Sine of x + quarters pi/2, with x reduced by multiples of pi/2.
 
-    pi/2 is a sum of four parts, three of them with 29 bits, so that up to 2^24 multiples of each are exact.
+    pi/2 is written as a sum of four parts, three of them with 29 bits, so that up to 2^24 multiples of each are exact.
     """
     shifted = x * 0.6366197723675814 + ROUND
     n = shifted - ROUND
@@ -206,7 +206,7 @@ def _circular(x: Any, quarters: int) -> Any:
 
 
 def sin(x: Any) -> Any:
-    """Sine for |x| up to 2.6e7; beyond, of an angle within 4 units of x; NaN beyond 2^45 (3.5e13)."""
+    """Sine for |x| up to 2.6e7; for larger |x| the sine of an angle within 4 units of x; NaN beyond 2^45 (3.5e13)."""
     return _circular(x, 0)
 
 

@@ -1,4 +1,4 @@
-"""Evaluation of equations within a program, with the numbers of a record."""
+"""Evaluation of a Model's equations within a program, with values loaded from a record."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Values = dict[str, Value]
 
 
 def times(value: Value, share: Value) -> Value:
-    """Product, left out where the share is one."""
+    """Product share * value; the value itself if the share is the number 1."""
     return value if not isinstance(share, Node) and share == 1 else share * value
 
 
@@ -33,7 +33,7 @@ def horner(coefficients: Sequence[Value], x: Node) -> Value:
 
 
 def total(terms: Sequence[Value]) -> Value:
-    """Sum, from the left."""
+    """Sum of terms, added from left to right."""
     value = terms[0]
     for term in terms[1:]:
         value = value + term
@@ -46,7 +46,7 @@ def slope_of(coefficients: Sequence[Value]) -> list[Value]:
 
 
 class Evaluator:
-    """Evaluations within one program: constants, inputs, unknowns, dense output."""
+    """Nodes of one program for the quantities of a record: constants, inputs, unknowns, dense output."""
 
     def __init__(self, kernel: Formulation, program: Program, extended: bool = False) -> None:
         self.kernel, self.program = kernel, program
@@ -59,7 +59,7 @@ class Evaluator:
         self.scales: list[Value] = [load(scale_at(layout, k)) for k in count]
 
     def inputs(self, moment: Value) -> Values:
-        """Inputs and their slopes at a local time of the segment."""
+        """Inputs and their slopes at a time in the segment, by name."""
         load, found, constant = self.program.load, {}, self.kernel.choice.level == "constant"
         layout = self.kernel.layout
         for i in range(layout.inputs):
@@ -78,21 +78,21 @@ class Evaluator:
         return [(load(groups[0] + i), load(groups[1] + i), load(groups[2] + i)) for i in places]
 
     def load_advance(self, moment: Value) -> Value:
-        """Displacement of the load point since the start of the segment."""
+        """Displacement of the load point from the start of the segment to a time in it."""
         load, layout = self.program.load, self.kernel.layout
         moved: Value = integral_to(moment, load(layout.level), load(layout.slope), self._waves(0), cos)
         return moved
 
     def state(self) -> list[Node]:
-        """State of the record."""
+        """Nodes that load the state from the record."""
         return [self.program.load(self.kernel.layout.state + i) for i in range(self.kernel.size)]
 
     def point(self, moment: Value) -> Values:
-        """State of the record and inputs at a local time."""
+        """State of the record, and inputs at a time in the segment, by name."""
         return self.inputs(moment) | {f"y{i}": y for i, y in enumerate(self.state())}
 
     def evaluated(self, formulas: Formulas, point: Values, found: bool = False) -> list[Value]:
-        """Values of formulas at a point, after solving for the unknowns there unless they are `found`."""
+        """Values of formulas at a point; unless `found`, the unknowns are solved there first."""
         given = self.constants | point
         if self.z and not found:
             self.z = solved(self.kernel, given, self.z, self.scales)
@@ -107,7 +107,7 @@ class Evaluator:
 
     @cached_property
     def stages(self) -> list[list[Value]]:
-        """Stages of the last step: loaded, or computed if only dense output needs them."""
+        """Stages of the last step, [stage][variable]: loaded, or computed if only dense output needs them."""
         kernel, method, load, n = self.kernel, self.kernel.method, self.program.load, self.kernel.size
         place = [[kernel.layout.stage + s * n + i for i in range(n)] for s in range(method.stages)]
         found: list[list[Value]] = [[load(row) for row in rows] for rows in place]
@@ -138,7 +138,7 @@ class Evaluator:
         return [old, change + inner[0], *(after - now for now, after in pairwise(inner)), -inner[-1]]
 
     def smooth_polynomial(self, i: int) -> list[Value]:
-        """Dense output of variable i corrected to have the exact rates at both ends (needed for Rosenbrock methods)."""
+        """Dense output of variable i, for Rosenbrock methods corrected to have the exact rates at both ends."""
         found = list(self.polynomial(i))
         if not self.kernel.method.implicit:
             return found
@@ -182,13 +182,11 @@ class Evaluator:
     # -- events
 
     def shares(self, contact: int) -> list[Value]:
-        """Shares of a contact (see `Formulation`): slip rate over the drive's and first contact's, σ over that
-        one's.
-        """
+        """Ratios of a contact in steady sliding: slip rate to the drive's, slip rate and σ to the first contact's."""
         return self.kernel.shares(self.constants)[3 * contact : 3 * contact + 3]
 
     def moment(self, point: Values, found: Sequence[Value], h: Value = 1.0, contact: int = 0) -> Observed:
-        """Arguments of the event functions of a contact, from its outputs v, acceleration and sigma at a point."""
+        """Arguments of the event functions of a contact, from its outputs `found` (v, acceleration, σ) at a point."""
         v, acceleration, sigma = found[:3]
         ratio, share, pressed = self.shares(contact)
 
@@ -206,7 +204,7 @@ class Evaluator:
     def moments(
         self, point: Values, found: Sequence[Value], h: Value = 1.0, rates: Sequence[Value] = ()
     ) -> list[Observed]:
-        """Arguments of the event functions of all contacts; accelerations are those at given `rates` of the state."""
+        """Arguments of the event functions of all contacts; accelerations follow from the state's `rates` if given."""
         each = len(found) // self.kernel.contacts
         moments = [self.moment(point, found[c * each :], h, c) for c in range(self.kernel.contacts)]
         if not (rates and self.kernel.moving):
@@ -216,7 +214,7 @@ class Evaluator:
         return [replace(one, acceleration=value) for one, value in zip(moments, accelerations, strict=True)]
 
     def further_contact_rows(self, found: Sequence[Value]) -> list[tuple[int, Value]]:
-        """(row, value) of what the record stores about further contacts, from v, acceleration and sigma of all."""
+        """Pairs (row, value) to store for further contacts, from v, acceleration and σ of all contacts."""
         stored: list[tuple[int, Value]] = []
         for c in range(1, self.kernel.contacts):
             v, _, sigma = found[3 * c : 3 * c + 3]
@@ -226,18 +224,18 @@ class Evaluator:
         return stored
 
     def event_values(self, moments: Sequence[Observed]) -> list[Value]:
-        """Values of all event functions.
+        """Values of all event functions, contact by contact.
 
         Raises
         ------
         TypeError
-            If one is a condition instead of a number.
+            If an event function returns a condition instead of a number.
         """
         found = [event.function(moment) for moment in moments for event in EVENTS]
         for event, value in zip(cycle(EVENTS), found, strict=False):
             if isinstance(value, bool) or (isinstance(value, Node) and value.kind == "bool"):
                 raise TypeError(
-                    f"event {event.name!r}: its function is a condition; it has to be a number that changes sign, "
-                    "such as the difference of what is compared"
+                    f"event {event.name!r}: its function returns a condition; it must return a number that changes "
+                    "sign, such as the difference of the two sides of a comparison"
                 )
         return found

@@ -1,4 +1,4 @@
-"""Sparse LU solution of the linear equations of a Rosenbrock method, without structural zeros."""
+"""Sparse LU solution of the linear equations of a Rosenbrock method; no operations for structural zeros."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ Matrix = dict[tuple[int, int], Value]
 
 
 def factorised(order: Sequence[int], jacobian: Matrix, diagonal: Value) -> tuple[Matrix, dict[int, Value]]:
-    """LU factors of `diagonal` I − J and inverse pivots, eliminated in an `order`.
+    """LU factors of `diagonal` I − J and inverse pivots, with elimination in a given `order`.
 
-    No pivoting: the diagonal dominates for accepted steps.
+    There is no pivoting, because the diagonal dominates for steps that are accepted.
     """
     filled: Matrix = {place: -value for place, value in jacobian.items() if place[0] != place[1]}
     filled |= {(i, i): diagonal - jacobian[i, i] if (i, i) in jacobian else diagonal for i in order}
@@ -32,7 +32,7 @@ def factorised(order: Sequence[int], jacobian: Matrix, diagonal: Value) -> tuple
 
 
 def substituted(matrix: tuple[Matrix, dict[int, Value]], right: Sequence[Value]) -> list[Value]:
-    """Solution for one right side by substitution."""
+    """Solution for one right-hand side, by substitution in the result of `factorised`."""
     filled, pivots = matrix
     order = list(pivots)
     r = list(right)

@@ -1,4 +1,4 @@
-"""Compiled kernels of one model and the arrays that they take."""
+"""Compiled kernels of one model, and the arrays of constants and settings that they need."""
 
 from __future__ import annotations
 
@@ -33,6 +33,8 @@ class Runner:
     ----------
     reduction : Reduction
     choice : Choice
+    plain : bool
+        True to run it in Python instead of machine code.
     """
 
     reduction: Reduction
@@ -65,9 +67,7 @@ class Runner:
         return table
 
     def settings(self, values: Mapping[str, Any], atol: np.ndarray) -> np.ndarray:
-        """Table of settings: those by name, then `atol` (rigs or 1, state), then guesses and scales of further
-        unknowns.
-        """
+        """Table of settings, one row per rig: `values` by name, `atol` (rigs or 1, state), then zeros for unknowns."""
         size = max([len(atol), *(np.size(value) for value in values.values())])
         further = guess_count(self.kernel.layout) - 1
         table = np.zeros((size, len(SETTINGS) + self.kernel.size + 2 * further))
@@ -90,6 +90,6 @@ def runner(
     pushes: tuple[str, ...] = (),
     presses: tuple[str, ...] = (),
 ) -> Runner:
-    """Kernel of a model (cached)."""
+    """Runner of a model (cached)."""
     reduction = reduce_model(model, eliminate, pushes, presses)
     return Runner(reduction, replace(choice, lanes=1), plain=True) if interpreting() else Runner(reduction, choice)

@@ -1,7 +1,7 @@
 """Translation of SymPy expressions to straight-line programs.
 
-Parts that depend on parameters only become *constants* of the trajectory, which NumPy computes once for any number of
-rigs; kernels see few operations and no parameters. Common subexpressions of the rest are computed once.
+Parts that depend only on parameters become *constants* of the trajectory, which NumPy computes once for any number of
+rigs, so that kernels have fewer operations and no parameters. Other common subexpressions are computed once.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from steadyslip.core.symbols import inner_symbol
 from steadyslip.kernels.nodes import Node, Value, as_node, primitive, select
 
 SQUARED = 2**10
-"""Largest exponent computed by repeated squaring; beyond it rounding adds up to more than that of `power`."""
+"""Largest exponent computed by repeated squaring; for larger ones its rounding error exceeds that of `power`."""
 
 
 class Constants:
-    """Parameter-only subexpressions of a kernel, numbered in order of first use."""
+    """Subexpressions of a kernel that depend only on parameters, numbered in order of first use."""
 
     def __init__(self, variables: Iterable[sp.Symbol]) -> None:
         self.variables = frozenset(variables)
@@ -82,7 +82,7 @@ class Constants:
         return [*self.symbols.values(), *self.rates.values()]
 
     def rate_of(self, constant: sp.Symbol, direction: int) -> sp.Symbol:
-        """Symbol for the rate of change of `constant` in a direction of parameter space, added to the constants."""
+        """Symbol for the derivative of `constant` in a direction of parameter space; it is added to the constants."""
         return self.rates.setdefault(
             (constant, direction), inner_symbol(f"{constant.name}_rate_{direction}", real=True)
         )
@@ -95,7 +95,7 @@ class Constants:
         found : ndarray (rigs, constants)
         rates : ndarray (rigs, directions, constants)
         inputs : mapping of symbol to ndarray (rigs, directions)
-            Rates of change of inputs; zero where absent.
+            Rates of change of inputs; zero for inputs that are missing.
         """
         size, (columns, directions, places) = len(self.symbols), self._rates_of_constants()
         table = np.zeros((len(found), len(self.all)))
@@ -108,7 +108,7 @@ class Constants:
         return table
 
     def _rates_of_constants(self) -> np.ndarray:
-        """Column of each rate of change of a constant, its direction, and the column of that constant (cached)."""
+        """Array (3, rates) for rates of change: column of the rate, direction, column of its constant (cached)."""
         size, count, found = self._rated
         if (size, count) != (len(self.symbols), len(self.rates)):
             order = {symbol: i for i, symbol in enumerate(self.symbols.values())}
@@ -120,12 +120,12 @@ class Constants:
         return found
 
     def function(self, arguments: Sequence[sp.Symbol]) -> Callable[..., list[Any]]:
-        """NumPy function from parameter values to the constants (without rates of change)."""
+        """NumPy function that computes the constants, without rates of change, from parameter values."""
         return ArrayFunction(arguments, list(self.symbols))
 
 
 class Formulas:
-    """Expressions evaluated together, common subexpressions once.
+    """Expressions that are evaluated together, so that common subexpressions are computed once.
 
     Parameters
     ----------
@@ -145,20 +145,20 @@ class Formulas:
         return {self.names.get(e, e.name) for e in self._count if e.is_Symbol}
 
     def __call__(self, values: Mapping[str, Value]) -> list[Value]:
-        """Values of the expressions; inputs are numbers or nodes of a program."""
+        """Values of the expressions, from numbers or nodes of a program by name."""
         evaluation = _Evaluation(values, self.names, self._count)
         return [evaluation.value(expression) for expression in self.expressions]
 
 
 class _Evaluation:
-    """Evaluation of expressions; common subexpressions are cached."""
+    """One evaluation of expressions with given values; common subexpressions are cached."""
 
     def __init__(self, values: Mapping[str, Value], names: Mapping[sp.Symbol, str], count: dict[sp.Basic, int]) -> None:
         self.given, self.names, self.count = values, names, count
         self.known: dict[sp.Basic, Any] = {}
 
     def value(self, e: Any) -> Any:
-        """Value of an expression from the values of its symbols: products for small powers, selections for branches."""
+        """Value of an expression: small powers are computed by products, Piecewise by selections."""
         if e.is_Symbol:
             return self.given[self.names.get(e, e.name)]
         if e not in self.known:
@@ -190,7 +190,7 @@ class _Evaluation:
         return total
 
     def _term(self, e: Any) -> tuple[bool, Any]:
-        """(True if the term is subtracted, its absolute value)."""
+        """(True if the term is to be subtracted, value without the sign)."""
         if e.is_Number and e.is_negative:
             return True, float(-e)
         return self._product(e) if e.is_Mul and self.count[e] == 1 else (False, self.value(e))
@@ -210,7 +210,7 @@ class _Evaluation:
         return negative, value / _multiplied(below) if below else value
 
     def _power(self, base: Any, exponent: Any) -> Any:
-        """Power by squaring for integer exponents and half-integers (with a root), valid for negative bases too."""
+        """Power by squaring for integer and half-integer exponents (with a square root); also for negative bases."""
         value = self.value(base)
         twice = 2.0 * float(exponent) if exponent.is_Number else 0.5
         if not (twice.is_integer() and abs(twice) <= 2 * SQUARED):
@@ -241,7 +241,7 @@ class _Evaluation:
             return _COMPARED[c.rel_op](left, right)
         if type(c) not in _JOINED:
             raise NotAvailable(
-                f"the equations contain the condition {c}, which cannot be compiled; a law that is to move may use "
+                f"the equations contain the condition {c}, which cannot be compiled; laws in simulations may use "
                 "comparisons, and And, Or, Not, Xor, Implies, Equivalent and ITE of them"
             )
         return _JOINED[type(c)](*(as_node(self._condition(part), "bool") for part in c.args))
@@ -256,14 +256,14 @@ class _Evaluation:
             return 0.0  # derivative of sign(x), except at x = 0
         if type(e) not in _FUNCTIONS:
             raise NotAvailable(
-                f"the equations contain {type(e).__name__}(...), which cannot be compiled; a law that is to move may "
+                f"the equations contain {type(e).__name__}(...), which cannot be compiled; laws in simulations may "
                 f"use {', '.join(_FUNCTIONS.values())}, tan, abs, powers and Piecewise"
             )
         return primitive(_FUNCTIONS[type(e)], *arguments)
 
 
 def _differ(first: Node, *others: Node) -> Node:
-    """True where an odd number of conditions holds (exclusive or)."""
+    """True where an odd number of conditions is true (exclusive or)."""
     for other in others:
         first = (first | other) & ~(first & other)
     return first

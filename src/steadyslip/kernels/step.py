@@ -15,22 +15,22 @@ from steadyslip.kernels.record import Evaluator, Values, times, total
 from steadyslip.kernels.rosenbrock import factorised, substituted
 from steadyslip.kernels.source import Formulas
 
-INSTANT = 1e-13  # share of the time so far below which a step counts as none (500 roundings), if no state changes
-UNCHANGED = 1e-9  # change of a state over its absolute tolerance that counts as none; far below any allowed error
+INSTANT = 1e-13  # a step shorter than this share of the time so far (500 roundings) that changes no state: no progress
+UNCHANGED = 1e-9  # a state changes if it moves by more than this share of its absolute tolerance
 LOG_SAFETY = math.log(0.5)
-"""ln of the next step over the longest allowed: hardly any is rejected, and after tens of cycles the error is near
-rtol."""
+"""ln of the next step over the longest step that the error allows. With 0.5 hardly any step is rejected, and the error
+after tens of cycles is near rtol."""
 LAST_ERROR_WEIGHT, EARLIER_ERROR_WEIGHT = 0.7, 0.3
-"""Weights of the last two errors in step control: without the second, steps that stability limits oscillate about that
-limit and every sixth is rejected."""
-SHRINK, GROW = 0.2, 6.0  # limits of the ratio of a step to the one before; usual values (DOP853: 1/3, 6)
-LOWEST_TREND = -3.0  # an error smaller than the aim by this in ln e² does not count as a trend; chosen by trial
-INITIAL_SHARE = 1e-3  # share of the allowed error from which an event function has a sign at a segment's start
-LOG_SAFETY_REJECTED = math.log(0.8)  # ln of the step over the longest allowed after a rejection; chosen by trial
+"""Weights of the last two errors in step control. Without the second, steps that are limited by stability oscillate
+about the limit, and every sixth is rejected."""
+SHRINK, GROW = 0.2, 6.0  # limits of the ratio of a step to the previous one; usual values (DOP853: 1/3, 6)
+LOWEST_TREND = -3.0  # lower limit of ln e² - goal in the trend of errors; chosen by trial
+INITIAL_SHARE = 1e-3  # at a segment's start an event function has a sign beyond this share of the allowed error
+LOG_SAFETY_REJECTED = math.log(0.8)  # as LOG_SAFETY, after a rejected step; chosen by trial
 
 
 class Step(Evaluator):
-    """Writes the straight-line program of one integration step."""
+    """Straight-line program of one integration step."""
 
     def __init__(self, kernel: Formulation, name: str = "step") -> None:
         super().__init__(kernel, Program(name))
@@ -41,14 +41,14 @@ class Step(Evaluator):
         self.tau, self.proposed, self.end = load(Row.TAU), load(Row.H), load(Row.LENGTH)
         rest = self.end - self.tau
         self.rest = rest
-        self.last = self.proposed >= rest * 0.99999999  # no tiny step is left for rounding
+        self.last = self.proposed >= rest * 0.99999999  # so that rounding does not leave a tiny last step
         self.h: Value = select(self.last, rest, self.proposed)
         self.new: Sequence[Value] = ()
-        self.settled: Sequence[Value] = ()  # rates at the end of the step without the part that its error causes
+        self.settled: Sequence[Value] = ()  # rates at the end of the step, without the part caused by the step's error
         self.steady = None if kernel.timed else self.inputs(self.tau)
 
     def advance(self) -> None:
-        """Write the step itself, its error and the size of the next one."""
+        """Write the step itself, its error, and the size of the next step."""
         method = self.kernel.method
         errors = self._rosenbrock() if method.implicit else self._runge_kutta()
         error = self._squared(errors)
@@ -68,22 +68,22 @@ class Step(Evaluator):
         self.next_h = select(self.last & self.good, larger(self.proposed, next_h), next_h)
 
     def _log_growth(self) -> Node:
-        """Logarithm of the next step over this one, after an accepted step.
+        """ln of the ratio of the next step to this one, after an accepted step.
 
-        Smaller of two proposals (after Gustafsson 1991, 1994): from the errors, and from errors and steps if these go
-        on changing as between the last two. Before a slip event steps have to shrink by a constant factor, where the
-        second is right; after it they grow again, where the first is the better guide.
+        Smaller of two proposals (after Gustafsson 1991, 1994): from the last two errors; and from errors and steps, if
+        these continue to change as between the last two steps. Before a slip event steps shrink by a constant factor,
+        and the second proposal is right; after it they grow again, and the first is better.
         """
         per = 0.5 / self.kernel.method.order
         goal = LOG_SAFETY / per
         before = larger(self.earlier, goal + LOWEST_TREND)
-        asked = per * (LAST_ERROR_WEIGHT * (goal - self.size) - EARLIER_ERROR_WEIGHT * (goal - before))
+        by_errors = per * (LAST_ERROR_WEIGHT * (goal - self.size) - EARLIER_ERROR_WEIGHT * (goal - before))
         trend = primitive("rough_log", self.h * (1.0 / larger(self.program.load(Row.H_OLD), 1e-300)))
-        wanted: Node = smaller(asked, LOG_SAFETY - per * self.size + trend + per * (before - self.size))
+        wanted: Node = smaller(by_errors, LOG_SAFETY - per * self.size + trend + per * (before - self.size))
         return wanted
 
     def _squared(self, errors: Sequence[Value]) -> Value:
-        """Sum of squares of errors over allowed errors."""
+        """Sum of the squares of errors divided by the allowed errors."""
         found: Value = 0.0
         for i, e in enumerate(errors):
             scaled = e * (1.0 / (self.atol[i] + self.rtol * larger(abs(self.old[i]), abs(self.new[i]))))
@@ -91,11 +91,11 @@ class Step(Evaluator):
         return found
 
     def _estimate(self, weights: Sequence[float]) -> list[Value]:
-        """Error estimates of an explicit method."""
+        """Error estimates of all variables, for an explicit method with given weights of the stages."""
         return [self.h * weighted(weights, [k[i] for k in self.stages]) for i in range(self.kernel.size)]
 
     def _inputs_of(self, s: int) -> Values:
-        """Inputs at stage s."""
+        """Inputs at the time of stage s."""
         if self.steady is not None:
             return self.steady
         return self.inputs(self.tau + self.kernel.method.nodes[s] * self.h)
@@ -117,11 +117,11 @@ class Step(Evaluator):
         return self._estimate(method.error)
 
     def _reached(self, weights: Sequence[float], i: int) -> Value:
-        """Variable i in the argument of a stage, from the stages before it."""
+        """Variable i in the argument of a stage, from the stages so far."""
         known = [k[i] for k in self.stages]
         if self.kernel.choice.lanes > 1:
             return self.old[i] + self.h * weighted(weights, known)
-        # latency: the newest stage comes last, so that all other terms are added up before it is known
+        # to reduce latency, the newest stage is added last: all other terms can be summed while it is computed
         return (self.old[i] + self.h * weighted(weights, known[:-1])) + (self.h * weights[len(known) - 1]) * known[-1]
 
     def _rosenbrock(self) -> list[Value]:
@@ -148,7 +148,7 @@ class Step(Evaluator):
             for i in range(n):
                 if s and any(method.c[s]):
                     right[i] = right[i] + inverse * weighted(method.c[s], [u[i] for u in self.stages])
-                if kernel.timed and abs(method.time_weights[s]) > 1e-12:  # others are zero but for rounding
+                if kernel.timed and abs(method.time_weights[s]) > 1e-12:  # smaller weights are rounding errors of zero
                     right[i] = right[i] + h * method.time_weights[s] * in_time[i]
             self.stages.append(substituted(matrix, right))
         self.new = [y[i] + self.stages[-1][i] for i in range(n)]
@@ -159,11 +159,11 @@ class Step(Evaluator):
         return list(self.stages[-1])
 
     def _settled(self, inverse: Value) -> list[Value]:
-        """Rates at the end of a Rosenbrock step by the equation of its last stage u.
+        """Rates at the end y1 of a Rosenbrock step, from the equation of its last stage u.
 
-        They are f(y1 − u) + J u = u/(hγ) − Σ c_j u_j/h. f(y1) contains the error of y1 times the Jacobian there. For a
-        stiff system that is far more than the true rate and of either sign, unless the method has solved with the same
-        Jacobian, as in this equation.
+        They are f(y1 − u) + J u = u/(hγ) − Σ c_j u_j/h. In f(y1) itself, the error of y1 is multiplied by the Jacobian,
+        which for a stiff system gives much more than the true rate, of either sign. In this equation the error cancels,
+        because the method has solved with the same Jacobian.
         """
         method, (*before, last) = self.kernel.method, self.stages
         return [
@@ -172,7 +172,7 @@ class Step(Evaluator):
         ]
 
     def keep(self) -> None:
-        """Write the decision to keep or reject the step, and the flag that calls the driver."""
+        """Write the stores of an accepted or rejected step, and the flag that calls the driver."""
         load, store, good = self.program.load, self.program.store, self.good
         if self.kernel.choice.dense:
             self.store_stages()
@@ -211,10 +211,10 @@ class Step(Evaluator):
         store(Row.FLAG, flag * load(Row.ACTIVE))
 
     def _made_progress(self, moved: Value) -> Node:
-        """True if the step was accepted and changed anything.
+        """True if the step was accepted, and time or a state has changed noticeably.
 
-        At a fold of the balance steps shrink to the rounding of time, change no state and would be accepted for ever.
-        There are folds only where a balance has to be solved.
+        At a fold of the balance, steps shrink to the rounding of time, change no state and would be accepted forever.
+        Folds exist only if a balance has to be solved.
         """
         if not self.kernel.unknowns:
             return as_node(self.good, "bool")
@@ -224,7 +224,7 @@ class Step(Evaluator):
         return as_node(changed, "bool") & self.good
 
     def _events(self) -> Node:
-        """Write the sign changes of event functions; returns their number, zero for lanes that do not watch them."""
+        """Write the sign changes of event functions; returns their number, zero in lanes that do not watch events."""
         load, store, layout = self.program.load, self.program.store, self.kernel.layout
         here = self.here | {f"y{i}": value for i, value in enumerate(self.new)}
         moments = [self._with_errors(one) for one in self.moments(here, self.outputs, self.h, self.settled)]
@@ -250,7 +250,7 @@ class Step(Evaluator):
                     place = layout.event_count + kind
                     store(place, load(place) + select(own, 1.0, 0.0))
             store(layout.event_value + e, select(known, value, before))
-            if e % len(EVENTS) not in tuple(EventPlace):  # other events are only counted, unless there is a log
+            if e % len(EVENTS) not in tuple(EventPlace):  # without a log these events are only counted
                 change = select(load(Row.LOG) > 0.0, change, 0.0)
             count = count + abs(change)
         happened = count * load(Row.ACTIVE)
@@ -258,10 +258,10 @@ class Step(Evaluator):
         return happened
 
     def _with_errors(self, moment: Observed) -> Observed:
-        """Arguments of event functions with the uncertainty of velocity and acceleration at the end of the step.
+        """Arguments of event functions with `error` and `rounding` at the end of the step.
 
-        Velocity is known to the error allowed for its variable: relative for a logarithm, else relative to the drive's
-        velocity too. Acceleration has the rounding of velocity in the time of a step.
+        The error of the velocity is rtol times the velocity if its variable is a logarithm, else rtol times the sum of
+        velocity and drive velocity. The rounding of the acceleration is that of the velocity over the step.
         """
         one, load = self.kernel.reduction.slidings[moment.contact], self.program.load
         size = abs(as_node(moment.v))
@@ -271,7 +271,7 @@ class Step(Evaluator):
         return replace(moment, error=self.rtol * size, rounding=rounding)
 
     def store_state(self) -> None:
-        """Store the new state and its rates if the step is good, else the old ones."""
+        """Write the stores of the new state and its rates if the step is accepted, else of the old ones."""
         layout, store, good = self.kernel.layout, self.program.store, self.good
         for i in range(self.kernel.size):
             store(layout.state + i, select(good, self.new[i], self.old[i]))
@@ -286,7 +286,7 @@ class Step(Evaluator):
             store(place, select(good, z, self.program.load(place)))
 
     def store_stages(self) -> None:
-        """Store old state, stages and unknowns for dense output."""
+        """Write the stores of the old state, stages and unknowns for dense output."""
         layout, n, store = self.kernel.layout, self.kernel.size, self.program.store
         for i in range(n):
             store(layout.state_old + i, self.old[i])

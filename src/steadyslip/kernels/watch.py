@@ -1,8 +1,8 @@
-"""Program that finds frequent events in a group of lanes at once, and updates the statistics where there is no log.
+"""Program that finds frequent events in a group of lanes at once and updates their statistics, if no log is kept.
 
-Extremes of velocity and begin and end of slip are roots of the velocity variable's dense output or of its derivative.
-Lanes with other cases keep their flag and are left to the driver: lost contact, several events within a step, the end
-of fast slip, slip backward, begin or end of slip while inputs change, a root that is not found at once.
+Extremes of velocity, and begin and end of slip, are roots of the velocity variable's dense output or of its derivative.
+Lanes with other cases keep their flag for the driver: lost contact, several events within a step, the end of fast slip,
+backward slip, begin or end of slip while inputs change, a root that is not found in `ROUNDS` iterations.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from steadyslip.kernels.nodes import Node, Program, Value, as_node, larger, log,
 from steadyslip.kernels.record import Evaluator, horner, slope_of
 from steadyslip.kernels.source import Formulas
 
-ROUNDS = 2  # iterations of Halley's method (cubic) from the root of a straight line
-FOUND = 3e-4  # largest last change, as share of the step: with cubic convergence the error is near its cube, 3e-11
+ROUNDS = 2  # iterations of Halley's method (cubic convergence), started at the root of the secant
+FOUND = 3e-4  # largest last change of a root, as share of the step; the error is then near its cube, 3e-11
 
 
 class Watch(Evaluator):
-    """Writer of this program."""
+    """Program ``watch_group`` of a kernel; `speed` gives the velocity from the velocity variable."""
 
     def __init__(self, kernel: Formulation, speed: Formulas) -> None:
         super().__init__(kernel, Program("watch_group"))
@@ -54,7 +54,7 @@ class Watch(Evaluator):
         return self.program
 
     def _locate(self) -> None:
-        """Write the fraction of the step at which velocity turns or slip begins or ends."""
+        """Write the root: the fraction of the step at which velocity has an extreme, or slip begins or ends."""
         kernel, program, w = self.kernel, self.program, self.kernel.layout.w
         own, smooth_polynomial = self.polynomial(w), self.smooth_polynomial(w)
         limit = program.load(Row.W_LIMIT)
@@ -85,13 +85,13 @@ class Watch(Evaluator):
         self.place = self.there[kernel.layout.x] + program.load(Row.LOAD_MOVED) + self.load_advance(self.tau)
 
     def _kept(self, row: int, condition: Node, value: Value) -> Node:
-        """Store a value in a row where a condition holds; returns the row's new value."""
+        """Write a store of a value to a row where a condition is true; returns the row's new value."""
         new: Node = select(condition, value, self.program.load(row))
         self.program.store(row, new)
         return new
 
     def _turn(self) -> None:
-        """Update the statistics of peaks and troughs of velocity."""
+        """Write the update of the statistics of peaks and troughs of velocity."""
         load = self.program.load
         peak = self.here & self.peak
         self._kept(Row.PEAK_VELOCITY, peak, larger(load(Row.PEAK_VELOCITY), self.v))
@@ -105,7 +105,7 @@ class Watch(Evaluator):
         self._kept(Row.LAST_PEAK_TIME, peak, self.time)
 
     def _size(self) -> Node:
-        """ln of velocity over load-point velocity."""
+        """ln of the ratio of velocity to load-point velocity; infinite if the latter is zero."""
         kernel, v_lp = self.kernel, as_node(self.v_lp)
         size: Value = log(abs(as_node(self.v) / v_lp))
         if kernel.reduction.velocity == "logarithm" and kernel.choice.level == "constant":
@@ -114,15 +114,15 @@ class Watch(Evaluator):
         return found
 
     def _slip(self) -> None:
-        """Update begin of slip, its mark as fast at a peak, and its end where it was slow."""
+        """Write the update of slip in progress: its begin, its mark as fast at a peak, and its end if it was slow."""
         load, here = self.program.load, self.here
         anew = self.trough & (self.now_event <= 0.0) & (as_node(self.v) < self.now_from)
         anew = here & (self.begins | (anew & (self.now_from < float("inf"))))
         over = here & self.ends
         self._kept(Row.NOW_FROM, anew | over, select(anew, self.v, float("inf")))
         v_lp, least = abs(as_node(self.v_lp)), load(Row.V_LOW)
-        asked = select(v_lp > least, v_lp, load(Row.V_DRIVE))
-        quick = here & self.peak & (as_node(self.v) >= SLIP_EVENT * larger(asked, self.now_from))
+        pace = select(v_lp > least, v_lp, load(Row.V_DRIVE))
+        quick = here & self.peak & (as_node(self.v) >= SLIP_EVENT * larger(pace, self.now_from))
         event = select(quick, 1.0, self.now_event)
         self.program.store(Row.NOW_EVENT, select(anew | over, 0.0, event))
         highest = select(here & self.peak, larger(load(Row.NOW_PEAK), self.v), load(Row.NOW_PEAK))

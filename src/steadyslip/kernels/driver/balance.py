@@ -1,4 +1,4 @@
-"""Solution of the force balances for velocity variables and unknowns, at the start of a run and after a jump."""
+"""Solution of the force balances for velocity variables w and unknowns, at the start of a run and after a jump."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.places import guess_at, scale_at
 from steadyslip.kernels.layout import Layout, Routines, call
 
-FIRST_REACH = 0.01  # first step of a bracket over the natural size of w; by trial: larger ones may skip a root
-ROUNDS = 300  # sweeps over coupled balances before giving up; chosen by trial
-MOST_TRIALS = 200  # of a bracket and of its root: doubling reaches 1e58 scales, halving the last bit after some 60
-SETTLED = 1e-14  # relative change of the unknowns in a sweep, some tens of roundings, that counts as converged
-NEWTON_STEPS = 50  # most Newton steps for all balances; the steps at least halve, so that 37 lead from 1 to ROUNDED
-ROUNDED = 1e-11  # relative change of an unknown that rounding of the balances may cause: below it, converged
+FIRST_REACH = 0.01  # first step in search of a bracket, over the scale of w; by trial: larger ones may skip a root
+ROUNDS = 300  # most sweeps over coupled balances; chosen by trial
+MOST_TRIALS = 200  # most steps to a bracket, and in it: doubling reaches 1e58 scales, bisection ends after some 60
+SETTLED = 1e-14  # relative change of the unknowns in a sweep below which it has converged: some tens of roundings
+NEWTON_STEPS = 50  # most Newton steps for all balances; each at least halves the last, so that 37 reach ROUNDED from 1
+ROUNDED = 1e-11  # relative change of an unknown that rounding of the balances may cause; smaller ones: converged
 
 
 def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> bool:
-    """Solve all balances for their unknowns and velocity variables, in place of the guesses; False if one has no root.
+    """Solve all balances; the solution replaces the guesses in the record. False if no solution is found.
 
-    Each balance is solved with the other unknowns fixed, in turn, which leads to the solution that is next in the
-    direction of the forces. Where balances are strongly coupled (dashpot, normal force) this converges slowly, and
-    Newton's method for all unknowns finishes it.
+    The balances are solved in turn, with the other unknowns fixed, which finds the first solution in the direction of
+    the forces. If balances are strongly coupled (dashpot, normal force) this converges slowly, and Newton's method for
+    all unknowns completes it.
     """
     for _ in range(ROUNDS):
         moved = 0.0
@@ -39,8 +39,9 @@ def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> bo
 
 
 def solve_together(R: Array, layout: Layout, routines: Routines, y: Array) -> bool:
-    """Apply Newton's method to all balances while each step at least halves; if it fails, return False and restore the
-    guesses.
+    """Newton's method for all balances, as long as each step is at most half the last; True if it has converged.
+
+    Otherwise the guesses in the record are restored.
     """
     n = layout.massless
     last, size, changes, kept = 2.0, 0.0, 2 * n, 3 * n
@@ -65,10 +66,10 @@ def solve_together(R: Array, layout: Layout, routines: Routines, y: Array) -> bo
 
 
 def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array) -> float:
-    """Root w of balance k nearest to the guess: bracketed outwards from it, then safeguarded Newton; NaN if none.
+    """Root w of balance k by a bracket that grows from the guess, then safeguarded Newton; NaN if no root is found.
 
-    Several w may be roots. A massless block moves to the first one in the direction of the force, so the first step is
-    much smaller than the natural size of w.
+    There may be several roots. A massless block moves to the first root in the direction of the force, so the first
+    step is much smaller than the scale of w.
     """
     place, scale = guess_at(layout, k), R[scale_at(layout, k)]
     own = layout.massless + k
@@ -96,7 +97,7 @@ def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array
             step = 2.0 * step
         else:
             step = 0.25 * step
-            if abs(step) < 1e-12 * (1.0 + abs(w)):  # the balance is finite nowhere near
+            if abs(step) < 1e-12 * (1.0 + abs(w)):  # the balance is not finite close to w
                 break
     if not found:
         return math.nan
@@ -114,7 +115,7 @@ def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array
         trial = w - value / slope if slope > 0.0 else math.nan
         if not (low < trial < high):
             trial = 0.5 * (low + high)
-        if trial == w or high - low <= 4e-16 * abs(trial):  # two roundings
+        if trial == w or high - low <= 4e-16 * abs(trial):  # 4e-16: two rounding errors
             w = trial
             break
         w = trial

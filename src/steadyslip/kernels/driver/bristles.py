@@ -1,7 +1,7 @@
-"""Rosenbrock steps of a held rig: Y' = A Y + H f(G Y), with friction and memories of bristles f by the model's routine.
+"""Rosenbrock steps of a held rig: Y' = A Y + H f(G Y), where the model's routine computes friction and bristles f.
 
-Arrays: constants of the routine R; the tableau, whose rows are the arguments of the stages and the result, the
-couplings, the error, three of dense output, and γ; A, G, H; the sizes of the variables.
+Arrays of `Bristles`: constants R of the routine; the tableau, whose rows are the arguments of the stages and the
+result, the couplings, the error, three rows of dense output, and γ; A, G, H; typical sizes of the variables Y.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from steadyslip.kernels.layout import Held, Layout, Routines, call
 
 Bristles = tuple[Array, Array, Array, Array, Array, Array]
 Space = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
-LONGER = 5.0  # bounds and caution of the change of a step are those of Hairer & Wanner (1996)
-SHORTER = 0.2
-SAFETY = 0.9
+LONGER = 5.0  # largest factor from one step to the next, as in Hairer & Wanner (1996)
+SHORTER = 0.2  # smallest factor (same source)
+SAFETY = 0.9  # factor of the step that the error estimate allows (same source)
 
 
 def held_rates(layout: Layout, routines: Routines, bristles: Bristles, Y: Array, y: Array, rates: Array) -> None:
-    """Rates of all variables; `y` is as the routine leaves it."""
+    """Write the rates Y' to `rates`, and inputs G Y, outputs f and their slopes to `y`."""
     A, G, H = bristles[2], bristles[3], bristles[4]
     size, inputs, outputs = Y.shape[0], G.shape[0], H.shape[1]
     for k in range(inputs):
@@ -40,7 +40,7 @@ def held_rates(layout: Layout, routines: Routines, bristles: Bristles, Y: Array,
 
 
 def held_jacobian(bristles: Bristles, y: Array, jacobian: Array) -> None:
-    """Slopes of all rates at the state where `y` was computed."""
+    """Write the Jacobian of the rates to `jacobian`, from `y` as `held_rates` leaves it."""
     A, G, H = bristles[2], bristles[3], bristles[4]
     size, inputs, outputs = A.shape[0], G.shape[0], H.shape[1]
     for i in range(size):
@@ -55,7 +55,7 @@ def held_jacobian(bristles: Bristles, y: Array, jacobian: Array) -> None:
 
 
 def factorise(M: Array, order: Array) -> None:
-    """LU factors of a matrix in its place, with row exchanges."""
+    """Replace a matrix by its LU factors with partial pivoting; row exchanges go to `order`."""
     size = M.shape[0]
     for k in range(size):
         best = k
@@ -74,7 +74,7 @@ def factorise(M: Array, order: Array) -> None:
 
 
 def solve_factorised(M: Array, order: Array, b: Array) -> None:
-    """Solution in place of the right-hand side."""
+    """Replace the right-hand side b by the solution, from the LU factors of `factorise`."""
     size = M.shape[0]
     for k in range(size):
         best = int(order[k])
@@ -95,9 +95,9 @@ def try_step(
     layout: Layout, routines: Routines, bristles: Bristles, space: Space, Y: Array, length: float, rtol: float,
     found: Array,
 ) -> float:  # fmt: skip
-    """Mean error of a step over the allowed one; its dense output, (5, size), goes to `found`.
+    """Root-mean-square error of a step over the allowed error; its dense output, (5, size), is written to `found`.
 
-    Jacobian and rates at its start are in the work space.
+    Jacobian and rates at the start of the step are taken from the work space (`begin_step`).
     """
     tableau, scale = bristles[1], bristles[5]
     jacobian, M, order, first, rates, argument, y, stages = (
@@ -144,7 +144,7 @@ def try_step(
 
 
 def begin_step(layout: Layout, routines: Routines, bristles: Bristles, space: Space, Y: Array) -> None:
-    """Rates and Jacobian at the start of a step."""
+    """Write rates and Jacobian at the state Y, the start of a step, to the work space."""
     held_rates(layout, routines, bristles, Y, space[6], space[3])
     held_jacobian(bristles, space[6], space[0])
 
@@ -153,7 +153,7 @@ def take_step(
     layout: Layout, routines: Routines, bristles: Bristles, space: Space, Y: Array, clock: Array, most: float,
     found: Array,
 ) -> float:  # fmt: skip
-    """Length of a step of at most `most` (s) whose error is allowed; 0 if there is none that is long enough."""
+    """Length (s, up to `most`) of a step with allowed error, written to `found`; 0 if it would be too short."""
     scale = bristles[5]
     for i in range(Y.shape[0]):
         scale[i] = max(scale[i], abs(Y[i]))
@@ -167,7 +167,7 @@ def take_step(
         elif error > 0.0:
             factor = min(LONGER, max(SHORTER, SAFETY * error**-0.2))  # the error is of fifth order
         if error <= 1.0:
-            if length < most or factor < 1.0:  # a step cut short says nothing of longer ones
+            if length < most or factor < 1.0:  # a step cut to `most` is no guide to the length of the next one
                 clock[Held.LENGTH] = length * factor
             return length
         length = length * factor
@@ -179,8 +179,10 @@ def bristle_step(
     layout: Layout, routines: Routines, R: Array, tableau: Array, A: Array, G: Array, H: Array, scale: Array, Y: Array,
     clock: Array, found: Array, rates: Array, jacobian: Array, way: int,
 ) -> int:  # fmt: skip
-    """Rates and Jacobian at Y; with way 2 the dense output of a step of length `Held.STOP`, with way 1 of one that is
-    not longer and whose error is allowed, with its length in `Held.STOP`. Returns 1 if steps become too short.
+    """Write rates and Jacobian at Y, and for `way` 1 or 2 the dense output of a step from there.
+
+    With `way` 2 the step has the length `Held.STOP`; with `way` 1 it is at most that long and has an allowed error, and
+    its length is written to `Held.STOP`. Returns 1 if the step would be too short, else 0.
     """
     size, inputs, outputs = Y.shape[0], G.shape[0], H.shape[1]
     bristles = (R, tableau, A, G, H, scale)

@@ -17,19 +17,19 @@ from steadyslip.kernels.driver.places import (
 from steadyslip.kernels.driver.slip import mark_fast, record_event, track_slowest
 from steadyslip.kernels.layout import SLIP_EVENT, EventPlace, Kind, Layout, Out, Routines, Row
 
-MOST_BISECTIONS = 100  # of regula falsi, which needs about ten; halving alone would need 44
-LOCATED = 1e-13  # share of a step to which an event is located, some hundred roundings
+MOST_BISECTIONS = 100  # most iterations of regula falsi, which needs about ten; bisection alone would need 44
+LOCATED = 1e-13  # share of a step within which an event is located: some hundred rounding errors
 
 
 def event_function(R: Array, layout: Layout, routines: Routines, kind: int, theta: float, y: Array) -> float:
-    """Value of an event function at the fraction theta of the last step, with sign: positive before the event."""
+    """Value of the event function of a `Kind` at the fraction theta of the last step; positive before the event."""
     state_at_fraction(R, layout, routines, theta, y)
     value = y[event_functions_at(layout) + (kind - 1) // 2]
     return float(value if kind % 2 == 1 else -value)
 
 
 def located(R: Array, layout: Layout, routines: Routines, kind: int, y: Array) -> float:
-    """Fraction of the last step at which an event happens, by regula falsi (Illinois variant) on the dense output."""
+    """Fraction of the last step at which an event of a `Kind` happens, by regula falsi (Illinois) on dense output."""
     low, high = 0.0, 1.0
     at_low = event_function(R, layout, routines, kind, low, y)
     at_high = event_function(R, layout, routines, kind, high, y)
@@ -61,7 +61,7 @@ def located(R: Array, layout: Layout, routines: Routines, kind: int, y: Array) -
 def process_events(
     R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array, order: Array
 ) -> bool:  # fmt: skip
-    """Handle the events of the last step in order of time; True if contact is lost in it."""
+    """Record the events of the last step in order of time; if contact is lost, the step ends there: returns True."""
     tau_old, h = R[Row.TAU_OLD], R[Row.STEP_SIZE]
     each, count = events_per_contact(layout), 0
     for e in range(layout.events if R[Row.EVENT_COUNT] > 0.0 else 0):
@@ -86,7 +86,7 @@ def process_events(
                 R[guess_at(layout, k)] = y[unknown_at(layout, k)]
             for i in range(layout.size):
                 R[layout.state + i] = y[i]
-            for i in range(count):  # the step counted later events, which do not happen any more
+            for i in range(count):  # the step has counted later events, which no longer happen
                 if order[i, 0] < 2.0:
                     R[layout.event_count + int(order[i, 1]) - 1] -= 1.0
             return True
@@ -111,7 +111,7 @@ def save_before_jump(R: Array, layout: Layout) -> None:
 
 
 def events_of_jump(R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array) -> None:
-    """Handle events caused by a jump: begin and end of slip, and of slip events."""
+    """Record the events caused by a jump: begin and end of slip, and of slip events."""
     state_now(R, layout, routines, 0.0, y)
     for c in range(layout.contacts):
         own, each, v = tally_at(layout, c), events_per_contact(layout), y[outputs_at(layout, c) + Out.V]

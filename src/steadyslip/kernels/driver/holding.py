@@ -1,8 +1,8 @@
-"""Motion of a held rig while its mode stays.
+"""Motion of a held rig as long as its `HeldMode` (sticking contacts, active limits) does not change.
 
-The state is that of `steadyslip.nonlinear.hunting.plant`. The motion of a linear piece over a fixed time is one matrix
-(a *passage*), also between two samples of a controller, whose force is constant there; with bristles there are steps of
-`bristles`. What may change the mode is left to the caller, at the start of the step in which it may happen.
+The state is that of `steadyslip.nonlinear.hunting.plant`. The motion of a linear system over a fixed time is a product
+with one matrix (a *passage*), also between two samples of a controller, whose force is constant there. With bristles it
+is integrated by steps of `bristles`. A step in which the mode may change is left to the caller, at its start.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.bristles import Bristles, Space, take_step
 from steadyslip.kernels.layout import Control, Held, Layout, Routines, Turn
 
-NODES = 33  # of a step or passage: places where its values are looked at
-SAME = 1e-9  # share of a sample time up to which two lengths are one: rounding of times after a million samples
-RESTED = 0.002  # share of a rest from one row to the next: the force of a controller grows evenly meanwhile
-WHOLE = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer, halves to even
+NODES = 33  # number of evenly spaced points of a step or passage at which its values are evaluated
+SAME = 1e-9  # share of a sample time within which two lengths are equal: rounding of times after a million samples
+RESTED = 0.002  # shortest time between rows at rest, as share of the rest so far; the force grows evenly meanwhile
+WHOLE = 6755399441055744.0  # 1.5 * 2**52: adding and subtracting it rounds to an integer, halves to even
 
 
 def rounded_to(value: float, step: float) -> float:
@@ -28,14 +28,15 @@ def rounded_to(value: float, step: float) -> float:
 
 
 def beyond_band(error: float, band: float) -> float:
-    """Error beyond the dead band."""
+    """Error counted from the nearer end of the dead band; 0 within the band."""
     return error - band if error > band else error + band if error < -band else 0.0
 
 
 def wanted_force(Y: Array, control: Array, loops: Array) -> float:
-    """Force of the controller after a sample. A row of `loops` is gain, damping, place at the last sample, then shares.
+    """Force that the controller requests after a sample; updates integral and remembered places.
 
-    The integral grows by the error times the sample time, and derivatives are differences of the last two samples.
+    A row of `loops` is gain, damping, place at the last sample, then the shares of the coordinates in the place. The
+    integral grows by the error times the sample time; derivatives are differences of the last two samples.
     """
     size = loops.shape[1] - 3
     target, aim, band = Y[2 * size + 1], control[Control.AIM], control[Control.BAND]
@@ -75,7 +76,7 @@ def wanted_force(Y: Array, control: Array, loops: Array) -> float:
 
 
 def sample_if_due(Y: Array, clock: Array, control: Array, loops: Array, late: Array) -> None:
-    """Sample, and change the force, if it is time. Forces in `late` wait: when they take effect, and how large."""
+    """Take a sample, and apply a delayed force, if due. A row of `late` is time of action (s), force."""
     held, now = 2 * (loops.shape[1] - 3) + 3, clock[Held.TIME]
     was = Y[held]
     if now >= control[Control.COUNT] * control[Control.PERIOD]:
@@ -94,13 +95,13 @@ def sample_if_due(Y: Array, clock: Array, control: Array, loops: Array, late: Ar
 
 
 def next_instant(control: Array, late: Array) -> float:
-    """Time of the next sample or change of force (s)."""
+    """Time (s) of the next sample or of the next change of force, whichever is earlier."""
     sample = control[Control.COUNT] * control[Control.PERIOD]
     return float(min(sample, late[0, 0])) if control[Control.LATE] > 0.0 else float(sample)
 
 
 def least_of(row: Array, way: int) -> float:
-    """Least of values at evenly spaced nodes, of their negatives (way 1) or negative sizes (way 2), by a parabola."""
+    """Minimum, refined by a parabola, of values at evenly spaced nodes, of -values (`way` 1) or -|values| (`way` 2)."""
     best, least = 0, math.inf
     for i in range(NODES):
         value = row[i] if way == 0 else -row[i] if way == 1 else -abs(row[i])
@@ -117,7 +118,10 @@ def least_of(row: Array, way: int) -> float:
 
 
 def keep_values(values: Array, clock: Array, rows: Array, length: float) -> None:
-    """Keep values (error, speed, force, others) at the nodes of a step that begins now, and extremes of the stroke."""
+    """Append the values (error, speed, force, others) at the nodes of a step to `rows`; update extremes of the stroke.
+
+    The step begins at `Held.TIME`. At rest only some steps are stored (`RESTED`).
+    """
     now, row = clock[Held.TIME], int(clock[Held.ROWS])
     clock[Held.STEPS] += 1.0
     if clock[Held.RESTS] == 0.0 or now - clock[Held.LAST_ROW] >= RESTED * (now - clock[Held.SINCE]):
@@ -134,9 +138,9 @@ def keep_values(values: Array, clock: Array, rows: Array, length: float) -> None
 
 
 def may_fail(coefficients: Array, first: int, count: int) -> bool:
-    """True if a polynomial on 0..1 may have a value that is not positive.
+    """True if a polynomial may have a value <= 0 on 0..1; its coefficients start at index `first`.
 
-    Between two nodes it is not farther below their values than an eighth of its largest bend there.
+    Between two nodes it is below their values by at most an eighth of the spacing squared times its second derivative.
     """
     rest, bend, least = 0.0, 0.0, math.inf
     for k in range(1, count):
@@ -153,7 +157,7 @@ def may_fail(coefficients: Array, first: int, count: int) -> bool:
 
 
 def wants_look(Y: Array, clock: Array, control: Array, size: int, exact: bool) -> bool:
-    """True if nothing may move any more, or the error is beyond `Held.FAR`."""
+    """True if the caller must decide whether to go on: all speeds are small, or the error is beyond `Held.FAR`."""
     if max(float(clock[Held.HIGHEST]), -float(clock[Held.LOWEST])) > clock[Held.FAR]:
         return True
     if (control[Control.PERIOD] > 0.0 and control[Control.CONSTANT] == 0.0) or Y[2 * size + 2] != 0.0:
@@ -172,7 +176,10 @@ def pass_span(
     passage: Array, count: int, guards: int, degrees: int, Y: Array, clock: Array, rows: Array, out: Array,
     values: Array,
 ) -> int:  # fmt: skip
-    """Go on to `Held.STOP` in equal passages: rows of `passage` give the state, guards as polynomials, and values."""
+    """Advance to `Held.STOP` by `count` equal passages; returns a `Turn`.
+
+    The product of `passage` and the state gives the new state, the guards' polynomials, and the values at the nodes.
+    """
     size, start = Y.shape[0], clock[Held.TIME]
     length = (clock[Held.STOP] - start) / count
     for part in range(count):
@@ -199,7 +206,7 @@ def step_span(
     layout: Layout, routines: Routines, bristles: Bristles, space: Space, guards: Array, watched: Array, Y: Array,
     clock: Array, control: Array, coordinates: int, rows: Array, found: Array, out: Array, values: Array,
 ) -> int:  # fmt: skip
-    """Go on by steps with bristles to `Held.STOP`, or until the steps are used up or there is something to look at."""
+    """Advance by steps with bristles to `Held.STOP`, or until the caller must act (`Turn`, which is returned)."""
     size, orders = Y.shape[0], found.shape[0]
     while clock[Held.TIME] < clock[Held.STOP]:
         if clock[Held.STEPS] >= clock[Held.MOST_STEPS]:
@@ -243,7 +250,7 @@ def step_span(
 
 
 def passage_of(lengths: Array, span: float, period: float) -> int:
-    """Index of the passages over a span (s); -1 if there are none."""
+    """Index of the passage whose length is `span` (s); -1 if there is none."""
     for p in range(lengths.shape[0]):
         if abs(lengths[p, 0] - span) <= SAME * period:
             return p
@@ -255,11 +262,11 @@ def follow_held(
     guards: Array, watched: Array, lengths: Array, passages: Array, loops: Array, late: Array, Y: Array, clock: Array,
     control: Array, rows: Array, fresh: int,
 ) -> int:  # fmt: skip
-    """Go on up to `Held.END`, from sample to sample if there are some; returns what the caller has to do (`Turn`).
+    """Advance up to `Held.END`, from sample to sample if there are some; returns what the caller must do (`Turn`).
 
-    Passages have one row of `lengths` each: time (s) and number of equal parts; without samples there is one. If
-    `fresh`, only the sample that is due is taken, and the step after it is left to the caller. `rows` has room for the
-    steps up to `Held.MOST_STEPS` and one more span.
+    Each passage has a row of `lengths`: time (s) and number of equal parts; without samples there is one passage. If
+    `fresh`, only the sample that is due is taken, and the step after it is left to the caller. `rows` must have room
+    for the steps up to `Held.MOST_STEPS` and one more span.
     """
     size, count, outputs, number = Y.shape[0], G.shape[0], H.shape[1], guards.shape[0]
     coordinates = loops.shape[1] - 3

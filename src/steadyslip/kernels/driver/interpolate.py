@@ -1,4 +1,4 @@
-"""State and outputs at the current time and, by dense output, at any time of the last step; results go to `y`."""
+"""State and outputs at the current time or, by dense output, within the last step; results are written to `y`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def state_now(R: Array, layout: Layout, routines: Routines, tau: float, y: Array
 
 
 def interpolate_state(R: Array, layout: Layout, routines: Routines, theta: float, y: Array) -> None:
-    """Interpolate the state at the fraction theta of the last step to `y`, with guesses of the unknowns."""
+    """Write the state at the fraction theta of the last step, and guesses of the unknowns there, to `y`."""
     if R[Row.EXTENDED] == 0.0:
         call(routines.extend, R, 0.0, y)
     call(routines.dense, R, theta, y)

@@ -23,14 +23,14 @@ from steadyslip.kernels.driver.slip import record_event
 from steadyslip.kernels.layout import MOST_FAILURES, Cursor, Final, Kind, Layout, Routines, Row, Setting, Status
 
 RUNAWAY = 1e9
-"""Velocity over that of the drive above which a massless block whose steps fail counts as blown up. Contacts that a
-dashpot joins run away together, and time is too coarsely rounded to resolve that before the velocity overflows."""
+"""If steps of a massless block fail above this velocity over the drive's, the run counts as blow-up. Contacts joined by
+a dashpot run away together, and rounding of time prevents resolving that until the velocity overflows."""
 Arrays = tuple[Array, Array, Array, Array, Array]
 Results = tuple[Array, Array, Array, Array, Array, Array]
 
 
 def first_step(R: Array, layout: Layout) -> float:
-    """First step (s): a hundredth of the time in which the fastest variable changes by its scale, at most `Row.H`."""
+    """First step (s), at most `Row.H`: about 0.01 of the time in which the fastest variable changes by its size."""
     rtol = R[Row.RTOL]
     fastest = 0.0
     for i in range(layout.size):
@@ -73,7 +73,7 @@ def load_job(
 
 
 def exhausted(S: Array, lanes: int, lane: int) -> int:
-    """Status of a lane that must stop (too many rejected steps in a row, or steps in all); RUNNING if it may go on."""
+    """STUCK or TOO_MANY_STEPS for a lane with too many rejected steps in a row, or too many steps; else RUNNING."""
     if S[Row.FAILURES * lanes + lane] >= MOST_FAILURES:
         return Status.STUCK
     if S[Row.ACCEPTED * lanes + lane] + S[Row.REJECTED * lanes + lane] >= S[Row.MOST_STEPS * lanes + lane]:
@@ -84,7 +84,7 @@ def exhausted(S: Array, lanes: int, lane: int) -> int:
 def start_job(
     R: Array, layout: Layout, routines: Routines, j: int, cursor: Array, log: Array, arrays: Arrays, y: Array
 ) -> bool:
-    """Load a job into a lane and enter its first segment; False if the balances give no velocity."""
+    """Load job j into a record and enter its first segment; False if the balances have no solution."""
     constants, initial, settings, segments, times = arrays
     load_job(R, layout, 1, 0, j, layout.continuous, constants, initial, settings)
     if not enter_segment(R, layout, routines, j, 0, segments, y):
@@ -100,7 +100,7 @@ def start_job(
 def start_tally(
     R: Array, layout: Layout, routines: Routines, contact: int, log: Array, cursor: Array, y: Array
 ) -> None:
-    """Initialise the event statistics of a contact; slip that is going on counts as begun."""
+    """Initialise the event statistics of a contact; if it slips already, a begin of slip is recorded."""
     own, v = tally_at(layout, contact), velocity_at(R, layout, contact)
     R[own + Row.PEAK_VELOCITY] = v
     R[own + Row.LOWEST_VELOCITY] = v
@@ -120,7 +120,7 @@ def start_tally(
 
 
 def highest_velocity(R: Array, layout: Layout) -> float:
-    """Highest velocity (m/s) of all contacts, each divided by its share of the first contact's slip rate."""
+    """Largest |velocity| (m/s) of all contacts, each divided by its ratio to the first contact in steady sliding."""
     found = abs(R[Row.V])
     for c in range(1, layout.contacts):
         found = max(found, abs(R[layout.further_contact + 3 * (c - 1) + 2]))
@@ -128,7 +128,7 @@ def highest_velocity(R: Array, layout: Layout) -> float:
 
 
 def lowest_stress(R: Array, layout: Layout) -> float:
-    """Lowest normal stress (Pa) of all contacts, each divided by its share of the first contact's."""
+    """Lowest normal stress (Pa) of all contacts, each divided by its ratio to the first contact in steady sliding."""
     found = R[Row.SIGMA]
     for c in range(1, layout.contacts):
         found = min(found, R[layout.further_contact + 3 * (c - 1) + 1])
@@ -136,7 +136,7 @@ def lowest_stress(R: Array, layout: Layout) -> float:
 
 
 def finish(R: Array, layout: Layout, row: int, status: int, results: Results) -> None:
-    """Write the results of a job to its row and mark the lane as free."""
+    """Write the final results of a job to its row, and mark the lane as free."""
     statuses, final, tally = results[0], results[1], results[2]
     statuses[row] = status
     final[row, Final.TIME] = clock(R, R[Row.TAU])
@@ -162,7 +162,7 @@ def continue_job(
     R: Array, layout: Layout, routines: Routines, j: int, cursor: Array, arrays: Arrays, results: Results, y: Array,
     order: Array,
 ) -> int:  # fmt: skip
-    """Process the last step of a flagged job (events, samples, segment ends); returns the job's status."""
+    """Process the last step of a job whose flag is set (events, samples, segment ends); returns its `Status`."""
     j0 = cursor[Cursor.FIRST_JOB]
     segments, times = arrays[3], arrays[4]
     samples, log, recorded = results[3], results[4], results[5]
@@ -210,7 +210,7 @@ def serve_lane(
     R: Array, layout: Layout, routines: Routines, lane: int, ids: Array, cursor: Array, arrays: Arrays,
     results: Results, y: Array, order: Array,
 ) -> None:  # fmt: skip
-    """Serve a flagged lane: continue its job, or finish it and start the next one."""
+    """Continue the job of a lane whose flag is set, or finish it and start the next job there."""
     j = ids[lane]
     if j >= 0:
         status = continue_job(R, layout, routines, j, cursor, arrays, results, y, order)

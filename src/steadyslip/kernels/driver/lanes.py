@@ -1,4 +1,4 @@
-"""Loop of single runs and ensembles: each lane integrates a job of its own, with its own breakpoints."""
+"""Loop for single runs and ensembles: each lane integrates its own job, with its own breakpoints."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from steadyslip.kernels.driver.places import output_size
 from steadyslip.kernels.driver.samples import BETWEEN
 from steadyslip.kernels.layout import GROUP, Cursor, Layout, Routines, Row, Setting, call
 
-LOGGED_AT_ONCE = 20  # rows of the log per lane and contact that one service may need: two for each kind of event
+LOGGED_AT_ONCE = 20  # most rows that `serve_lane` may add to the log, per contact: two for each kind of event
 
 
 def flagged(S: Array, lanes: int) -> int:
-    """Number of lanes whose flag is raised."""
+    """Number of lanes whose flag is set."""
     count = 0
     for lane in range(lanes):
         count += 1 if S[Row.FLAG * lanes + lane] != 0.0 else 0
@@ -22,7 +22,7 @@ def flagged(S: Array, lanes: int) -> int:
 
 
 def watch(layout: Layout, routines: Routines, S: Array, y: Array) -> None:
-    """Search for events in each group of lanes in which a flag is raised."""
+    """Search for frequent events in each group of lanes in which a flag is set."""
     for first in range(0, layout.lanes, GROUP):
         for lane in range(first, first + GROUP):
             if S[Row.FLAG * layout.lanes + lane] != 0.0:
@@ -35,12 +35,12 @@ def advance(
     settings: Array, segments: Array, times: Array, statuses: Array, final: Array, tally: Array, samples: Array,
     log: Array, recorded: Array, quota: int,
 ) -> int:  # fmt: skip
-    """Integrate all jobs that `cursor` numbers.
+    """Integrate the jobs from `Cursor.NEXT_JOB` to before `Cursor.LAST_JOB`.
 
     Returns
     -------
     int
-        0 when they are done, 1 if a buffer is full, 2 if `quota` steps are taken.
+        0 if all are done, 1 if the buffer of the log or of steps is full, 2 after `quota` steps; call again to go on.
     """
     arrays = (constants, initial, settings, segments, times)
     results = (statuses, final, tally, samples, log, recorded)

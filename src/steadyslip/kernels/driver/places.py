@@ -1,4 +1,4 @@
-"""Indices of quantities in the output array and in a record, for any contact and unknown."""
+"""Indices of quantities in the output array and in a record, as functions of contact and unknown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def event_functions_at(layout: Layout) -> int:
 
 
 def further_at(layout: Layout) -> int:
-    """Index of the first further observable in the output array."""
+    """Index of the first additional observable in the output array."""
     return event_functions_at(layout) + layout.events
 
 
@@ -29,7 +29,7 @@ def unknown_at(layout: Layout, index: int) -> int:
 def output_size(layout: Layout) -> int:
     """Length of the output array: state, outputs, event functions, further observables, further unknowns.
 
-    The solution of balances uses the array for residuals, derivatives, Newton changes and saved guesses.
+    The solver of the balances uses the array for residuals, derivatives, Newton changes and saved guesses.
     """
     return max(further_at(layout) + layout.further + layout.unknowns, 4 * layout.massless)
 
@@ -50,12 +50,12 @@ def events_per_contact(layout: Layout) -> int:
 
 
 def tally_at(layout: Layout, contact: int) -> int:
-    """Offset that turns a row between `Row.EVENTS` and `Row.SMALL_DROP` into that of a contact."""
+    """Offset to add to a `Row` from EVENTS to SMALL_DROP to get the row of a contact."""
     return layout.further_statistics + (contact - 1) * TALLIED - Row.EVENTS if contact > 0 else 0
 
 
 def slip_sense(R: Array, layout: Layout, contact: int) -> float:
-    """Direction in which a contact slips ahead of the load point at the end of the step: 1, -1, or 0 for neither."""
+    """1 or -1 if a contact slips forward or backward faster than the load point at the end of the step, else 0."""
     first = layout.event_value + events_per_contact(layout) * contact
     if R[first + EventPlace.SLIP] > 0.0:
         return 1.0
@@ -63,12 +63,12 @@ def slip_sense(R: Array, layout: Layout, contact: int) -> float:
 
 
 def guess_count(layout: Layout) -> int:
-    """Number of quantities that have a guess: unknowns and velocity variables that balances fix, at least one."""
+    """Number of quantities with a guess: unknowns, or velocity variables solved from balances; at least 1."""
     return max(max(layout.massless, layout.unknowns), 1)
 
 
 def guess_at(layout: Layout, index: int) -> int:
-    """Index in a record of an unknown, or of the guess of a velocity variable that a balance fixes."""
+    """Index in a record of an unknown, or of the guess of a velocity variable solved from a balance."""
     return layout.guess + index - 1 if index > 0 else int(Row.Z)
 
 

@@ -14,7 +14,7 @@ BETWEEN = 3  # extra points recorded within each step of a method of high order,
 
 
 def schedule_sample(R: Array, times: Array) -> None:
-    """Set the local time of the next requested sample, which the kernel compares with its own."""
+    """Set `Row.NEXT_TIME`, the time in the segment of the next requested sample, at which the step sets the flag."""
     k = int(R[Row.NEXT_SAMPLE])
     R[Row.NEXT_TIME] = times[k] - R[Row.START] if k < times.shape[0] else math.inf
 
@@ -22,9 +22,10 @@ def schedule_sample(R: Array, times: Array) -> None:
 def take_samples(
     R: Array, layout: Layout, routines: Routines, row: int, times: Array, samples: Array, at_end: bool, y: Array
 ) -> None:
-    """Store the state at each requested time that the step has passed, by dense output; at the end of a run, as it is.
+    """Store the state at each requested time that the step has passed, by dense output.
 
-    A sample at a breakpoint belongs to the segment that begins there, one at the end of the run to the last segment.
+    With `at_end` (of the run), the current state is stored instead. A sample at a breakpoint belongs to the segment
+    that begins there, a sample at the end of the run to the last segment.
     """
     arrived = R[Row.TAU] >= R[Row.LENGTH]
     k = int(R[Row.NEXT_SAMPLE])
@@ -48,7 +49,7 @@ def take_samples(
 
 
 def record(R: Array, layout: Layout, tau: float, y: Array, cursor: Array, recorded: Array) -> None:
-    """Append the point in `y`, at local time tau, to the recorded steps."""
+    """Append the point in `y`, at time tau in the segment, to the recorded steps."""
     i = cursor[Cursor.RECORDED]
     recorded[i, Recorded.TIME] = clock(R, tau)
     recorded[i, Recorded.SEGMENT] = R[Row.SEGMENT]
@@ -60,7 +61,7 @@ def record(R: Array, layout: Layout, tau: float, y: Array, cursor: Array, record
 
 
 def record_step(R: Array, layout: Layout, routines: Routines, cursor: Array, recorded: Array, y: Array) -> None:
-    """Record the end of the last step, with points between where a method of high order takes long steps."""
+    """Record the end of the last step; before it, for methods of high order with long steps, points within the step."""
     for i in range(1, BETWEEN + 1 if layout.extra > 0 else 1):
         theta = i / (BETWEEN + 1)
         interpolate_state(R, layout, routines, theta, y)

@@ -10,7 +10,7 @@ from steadyslip.kernels.layout import Layout, Routines, Row, call
 
 
 def clock(R: Array, tau: float) -> float:
-    """Time since the start of the run at local time tau; at the segment's end exactly that of the breakpoint."""
+    """Time (s) since the start of the run at time tau in the segment; exact at the segment's end."""
     return float(min(R[Row.START] + tau, R[Row.STOP]) if tau < R[Row.LENGTH] else R[Row.STOP])
 
 
@@ -36,7 +36,7 @@ def begin_segment(S: Array, layout: Layout, lanes: int, lane: int, row: Array) -
 
 
 def enter_segment(R: Array, layout: Layout, routines: Routines, j: int, k: int, segments: Array, y: Array) -> bool:
-    """Enter segment k: jump of the load point, new inputs, velocity from the balance; False if there is none."""
+    """Enter segment k: jump of the load point, new inputs, velocity from the balances; False if that fails."""
     s = j if segments.shape[0] > 1 else 0
     if k > 0:
         call(routines.restore, R, 0.0, y)

@@ -11,7 +11,7 @@ from steadyslip.kernels.layout import ALIKE, EVENT_SHARE, NUMBER, RESTED, SLIP_E
 
 
 def track_slowest(R: Array, layout: Layout, contact: int, slowest: float, tau: float, y: Array) -> None:
-    """Store the state at the lowest speed of a block ahead of the load point: a slip event counts from there."""
+    """Store the state at the lowest speed of the slip in progress, from which a slip event is measured."""
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     R[own + Row.NOW_FROM] = slowest
     R[own + Row.NOW_EVENT] = 0.0
@@ -26,19 +26,19 @@ def track_slowest(R: Array, layout: Layout, contact: int, slowest: float, tau: f
 
 
 def mark_fast(R: Array, layout: Layout, contact: int, y: Array) -> None:
-    """Mark slip as fast if its speed reaches SLIP_EVENT times both that of the load point and its lowest.
+    """Mark the slip in progress as fast if its speed is SLIP_EVENT times the load point's and its own lowest speed.
 
-    While the load point rests, the velocity of the drive replaces its own.
+    While the load point rests, the velocity of the drive is used in place of the load point's.
     """
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     speed, v_lp, share = R[own + Row.NOW_SIGN] * y[n + Out.V], abs(y[n + Out.V_LP]), y[n + Out.SHARE]
-    asked = v_lp if v_lp > R[Row.V_LOW] * share else R[Row.V_DRIVE] * share
-    if speed >= SLIP_EVENT * max(asked, R[own + Row.NOW_FROM]):
+    least = v_lp if v_lp > R[Row.V_LOW] * share else R[Row.V_DRIVE] * share
+    if speed >= SLIP_EVENT * max(least, R[own + Row.NOW_FROM]):
         R[own + Row.NOW_EVENT] = 1.0
 
 
 def log_begin(R: Array, layout: Layout, contact: int, kind: int, number: float, log: Array, cursor: Array) -> None:
-    """Add the begin of the slip in progress to the log, if there is one."""
+    """Add the begin of the slip in progress to the log, if a log is kept."""
     if log.shape[0] > 0:
         own, i = tally_at(layout, contact), cursor[Cursor.LOGGED]
         log[i, 0] = kind + 2 * events_per_contact(layout) * contact
@@ -51,7 +51,7 @@ def log_begin(R: Array, layout: Layout, contact: int, kind: int, number: float, 
 def log_event(
     R: Array, layout: Layout, number: int, tau: float, y: Array, log: Array, cursor: Array, count: float
 ) -> None:  # fmt: skip
-    """Add an event to the log, if there is one."""
+    """Add an event to the log, if a log is kept."""
     if log.shape[0] > 0:
         n, i = outputs_at(layout, (number - 1) // (2 * events_per_contact(layout))), cursor[Cursor.LOGGED]
         log[i, 0], log[i, 1], log[i, 2], log[i, 3] = number, clock(R, tau), y[n + Out.V], y[n + Out.SIGMA]
@@ -61,7 +61,7 @@ def log_event(
 
 
 def count_ring(R: Array, layout: Layout, contact: int, log: Array, cursor: Array) -> None:
-    """Count forward slip that sheds little as a ring of the slip event before it."""
+    """Count forward slip with a small stress drop as ringing after the last slip event."""
     own = tally_at(layout, contact)
     if R[own + Row.EVENT_RINGS] > 0.0:
         R[own + Row.EVENT_RING_FREQUENCY] = 1.0 / (R[own + Row.NOW_BEGIN] - R[own + Row.LAST_RING])
@@ -71,12 +71,12 @@ def count_ring(R: Array, layout: Layout, contact: int, log: Array, cursor: Array
 
 
 def begin_event(R: Array, layout: Layout, contact: int, log: Array, cursor: Array) -> None:
-    """Count the slip in progress as a slip event of its own."""
+    """Count the slip in progress as a new slip event."""
     own = tally_at(layout, contact)
     sign, begin = R[own + Row.NOW_SIGN], R[own + Row.NOW_BEGIN]
     last = Row.FORWARD_BEGIN if sign > 0.0 else Row.BACKWARD_BEGIN
     R[own + Row.RECURRENCE] = begin - R[own + last]
-    R[own + last] = begin if begin > 0.0 else math.nan  # slip that went on at the start has no known begin
+    R[own + last] = begin if begin > 0.0 else math.nan  # the begin of slip already in progress at t = 0 is unknown
     R[own + Row.EVENTS] += 1.0
     R[own + Row.EVENT_BEGIN] = begin
     R[own + Row.EVENT_STRESS] = R[own + Row.NOW_STRESS]
@@ -87,10 +87,10 @@ def begin_event(R: Array, layout: Layout, contact: int, log: Array, cursor: Arra
 
 
 def goes_on_after_knock(R: Array, layout: Layout, contact: int, tau: float, drop: float) -> bool:
-    """Tell if small forward slip is stick-slip of its own: the last of `ALIKE` in a row that are alike after rests.
+    """True if small forward slip is stick-slip, not ringing: `ALIKE` similar stress drops in a row, each after a rest.
 
-    A knock, or a fast stroke of the drive, sheds so much that what comes after it sheds less than EVENT_SHARE of that.
-    Ringing has no rests, and each of its slips sheds less than the one before. What was before is forgotten then.
+    After a knock, or a fast stroke of the drive, the drops of ordinary stick-slip may be below EVENT_SHARE of the first
+    drop. Ringing has no rests, and its drops decrease. If True, the drop becomes the largest.
     """
     own = tally_at(layout, contact)
     begin, before = R[own + Row.NOW_BEGIN], R[own + Row.SMALL_DROP]
@@ -107,12 +107,12 @@ def goes_on_after_knock(R: Array, layout: Layout, contact: int, tau: float, drop
 
 
 def end_slip(R: Array, layout: Layout, contact: int, tau: float, y: Array, log: Array, cursor: Array) -> None:
-    """Tell at the end of slip what it was: a slip event, more of the one before, a ring, or too slow for any.
+    """Classify slip at its end: a slip event, a continuation of the last event, ringing, or too slow to count.
 
-    A slip event sheds at least EVENT_SHARE of the largest drop so far. It is more of the one before (in the same
-    direction) if the block did not rest between: the force rose by less than that share. If all that was counted before
-    shed less than EVENT_SHARE of its drop, that was ringing too, and the count begins anew. Smaller slip counts where
-    it goes on after a knock.
+    A slip event has a stress drop of at least EVENT_SHARE of the largest drop so far. It continues the last event (in
+    the same direction) if the stress rose by less than that share in between. If all earlier drops are smaller than
+    EVENT_SHARE of its drop, they were ringing too, and the count begins anew. Slip with a smaller drop is an event if
+    `goes_on_after_knock`.
     """
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     sign, fast = R[own + Row.NOW_SIGN], R[own + Row.NOW_EVENT]
@@ -155,7 +155,7 @@ def end_slip(R: Array, layout: Layout, contact: int, tau: float, y: Array, log: 
 
 
 def record_event(R: Array, layout: Layout, number: int, tau: float, y: Array, log: Array, cursor: Array) -> None:
-    """Add an event to statistics and log (if kept); `number` is its `Kind`, plus an offset for further contacts."""
+    """Add an event to the statistics, and to the log if kept; `number` is its `Kind`, plus an offset per contact."""
     contact = (number - 1) // (2 * events_per_contact(layout))
     kind = number - 2 * events_per_contact(layout) * contact
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
@@ -179,11 +179,11 @@ def record_event(R: Array, layout: Layout, number: int, tau: float, y: Array, lo
         if kind == fastest:
             mark_fast(R, layout, contact, y)
         elif R[own + Row.NOW_EVENT] == 0.0 and speed < R[own + Row.NOW_FROM] < math.inf:
-            track_slowest(R, layout, contact, speed, tau, y)  # slip before was too slow for an event
+            track_slowest(R, layout, contact, speed, tau, y)  # slip so far was too slow for an event
 
 
 def record_peak(R: Array, layout: Layout, contact: int, time: float, y: Array) -> None:
-    """Update the statistics of velocity peaks."""
+    """Update the statistics of velocity peaks of a contact by a peak at a time (s)."""
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     v, v_lp = y[n + Out.V], y[n + Out.V_LP]
     size = math.log(abs(v / v_lp)) if v_lp != 0.0 else math.inf

@@ -24,7 +24,7 @@ from steadyslip.kernels.layout import Layout, Out, Routines, Row, Sampled, Setti
 
 
 def set_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: int) -> None:
-    """Copy constants, guesses and scales of a rig to a record."""
+    """Copy constants, guesses and scales of a rig (row `own` of the tables) to a record."""
     for i in range(layout.constants):
         R[layout.constant + i] = constants[own if constants.shape[0] > 1 else 0, i]
     row, count = own if settings.shape[0] > 1 else 0, guess_count(layout)
@@ -36,7 +36,7 @@ def set_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: in
 
 
 def set_point(R: Array, layout: Layout, routines: Routines, points: Array, m: int, y: Array) -> None:
-    """Copy point m to a record and to `y`, and solve the balances where the state does not determine the velocity.
+    """Copy point m to a record and to `y`, and solve the balances if the state does not determine the velocity.
 
     Unknowns that are NaN in the point keep the guesses of the record.
     """
@@ -61,7 +61,7 @@ def set_point(R: Array, layout: Layout, routines: Routines, points: Array, m: in
 
 
 def advance_to_segment(R: Array, layout: Layout, routines: Routines, segments: Array, s: int, k: int, y: Array) -> None:
-    """Advance the record from its segment (-1: before the first) to segment k, adding up the load point's motion."""
+    """Advance the record from its segment (-1: before the first) to segment k, and sum the load point's motion."""
     while R[Row.SEGMENT] < k:
         if R[Row.SEGMENT] >= 0.0:
             R[Row.TAU] = R[Row.LENGTH]
@@ -76,12 +76,12 @@ def observe(
     layout: Layout, routines: Routines, constants: Array, settings: Array, segments: Array, points: Array, own: Array,
     segment: Array, times: Array, values: Array,
 ) -> None:  # fmt: skip
-    """Compute outputs and continuous variables at given points, into `values`.
+    """Compute outputs and continuous variables at given points, and write them to `values`.
 
-    `points` is (m, 1 + size + further unknowns); `own` (m,) the row of the rig; `segment` and `times` (m,) segment and
-    time since the start of the run, s. `values` is (7 contacts + kept + further, m): per contact `Out` up to ADVANCE,
-    which is here the load point's displacement since the start of the run, then the variables that jumps leave
-    unchanged, then further observables.
+    `points` is (m, 1 + size + further unknowns); `own` (m,) has the row of the rig; `segment` and `times` (m,) have the
+    segment and the time since the start of the run (s). `values` is (7 contacts + kept + further, m): for each contact
+    `Out` up to ADVANCE, which is here the load point's displacement since the start of the run; then the variables that
+    are continuous in jumps; then additional observables.
     """
     R, y = np.zeros(layout.rows), np.empty(output_size(layout))
     rig = -1
@@ -118,9 +118,9 @@ def field(
     layout: Layout, routines: Routines, constants: Array, settings: Array, points: Array, inputs: Array, own: Array,
     values: Array,
 ) -> None:  # fmt: skip
-    """Compute rates (m, size) at given points (m, 1 + size + further unknowns), into `values`.
+    """Compute rates at given points (m, 1 + size + further unknowns), and write them to `values` (m, size).
 
-    `inputs` (m, 2 inputs + 1) holds v_lp, q, p, ..., their slopes and the time; `own` (m,) the row of the rig.
+    `inputs` (m, 2 inputs + 1) has v_lp, q, p, ..., their slopes and the time; `own` (m,) has the row of the rig.
     """
     R, y = np.zeros(layout.rows), np.empty(output_size(layout))
     for m in range(points.shape[0]):

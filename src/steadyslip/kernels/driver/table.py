@@ -1,8 +1,8 @@
-"""Loop of fits: all lanes follow one table of inputs together, with sensitivities (`kernels/experiment.py`).
+"""Loop for fits: all lanes follow one table of inputs row by row, with sensitivities (`kernels/experiment.py`).
 
 A row of `segments` is start, end, jump of the load point, then values and slopes of the inputs. All jobs are observed
-at the same times. Each lane takes steps of its own size and interpolates at the times within them; where there are
-fewer jobs than lanes, several lanes integrate the same job and share its times.
+at the same times. Each lane takes steps of its own size and interpolates at the times within them. If there are fewer
+jobs than lanes, several lanes integrate the same job, and each observes some of the times.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from steadyslip.kernels.driver.jobs import exhausted, load_job
 from steadyslip.kernels.driver.segments import begin_segment
 from steadyslip.kernels.layout import Layout, Routines, Row, Status, call
 
-INSTANT = 1e-14  # share of a row's length: a motion that needs shorter steps runs away; about 50 roundings of time
+INSTANT = 1e-14  # shortest step over the row's length, about 50 roundings of time; a motion that needs less runs away
 
 
 def lanes_of_job(layout: Layout, count: int, lane: int) -> int:
-    """Number of lanes that integrate the same job as a lane, if there are `count` jobs."""
+    """Number of lanes, this one included, that integrate the job of a lane if there are `count` jobs."""
     return (layout.lanes - 1 - lane % count) // count + 1
 
 
@@ -28,7 +28,7 @@ def enter_row(
     S: Array, layout: Layout, group: int, count: int, k: int, segments: Array, times: Array, input_rates: Array,
     places: Array,
 ) -> None:  # fmt: skip
-    """Start row k of the table in all lanes: inputs, jump of the load point, local time of the next sample."""
+    """Enter row k of the table in all lanes: inputs, jump of the load point, time of the next sample."""
     W = layout.lanes
     for lane in range(W):
         job = group + lane % count
@@ -46,7 +46,7 @@ def enter_row(
 
 
 def schedule_table_sample(S: Array, lanes: int, lane: int, times: Array, is_last: bool) -> None:
-    """Set the local time of a lane's next sample; infinite if it is not in this row.
+    """Set the time of a lane's next sample from the start of the row; infinite if it is not in this row.
 
     A sample at the end of a row belongs to the next row.
     """
@@ -59,7 +59,10 @@ def schedule_table_sample(S: Array, lanes: int, lane: int, times: Array, is_last
 
 
 def shift_sensitivities(S: Array, layout: Layout, group: int, count: int, k: int, node_rates: Array) -> bool:
-    """Shift sensitivities where the start of row k depends on a direction, by the change of rates; True if any."""
+    """Shift sensitivities by the change of rates at the start of row k, if that time depends on a direction.
+
+    Returns True if any sensitivity was shifted.
+    """
     moved = False
     W, own = layout.lanes, layout.own
     for lane in range(W):
@@ -111,7 +114,7 @@ def lanes_due(S: Array, lanes: int) -> int:
 
 
 def store_samples(S: Array, layout: Layout, group: int, count: int, times: Array, is_last: bool, seen: Array) -> int:
-    """Store observables and derivatives of lanes that are due; returns how many are due again in the same step."""
+    """Store observable and derivatives of lanes that are due; returns the number of lanes due again in this step."""
     W, passed = layout.lanes, 0
     for lane in range(W):
         if S[Row.NEXT_TIME * W + lane] <= S[Row.TAU * W + lane] and S[Row.ACTIVE * W + lane] > 0.0:
@@ -131,11 +134,12 @@ def through_table(
 ) -> None:  # fmt: skip
     """Integrate all jobs through the table.
 
-    `constants`, `initial` (states), `settings` and `segments` (jobs, k, 9) have one row per job or one shared row. At
+    `constants`, `initial` (states), `settings` and `segments` (jobs, k, 9) have one row per job or one row for all. At
     `times` (samples,) the observable and its derivatives are written to `seen` (jobs, 1 + directions, samples); entries
     of a motion that stops early stay unchanged. `node_rates` (jobs, directions, k) and `input_rates` (jobs, directions,
-    k, 3) are the derivatives of breakpoint times and inputs, with no directions where none changes the table; `places`
-    are the indices of the rates of inputs among the constants. `steps` receives accepted and rejected steps.
+    k, 3) are the derivatives of breakpoint times and inputs; their second axis has length 0 if no direction changes the
+    table. `places` has the indices of the rates of inputs among the constants. The numbers of accepted and rejected
+    steps are written to `steps` (jobs, 2).
     """
     W = layout.lanes
     S, y = np.zeros(layout.rows * W), np.empty(2)

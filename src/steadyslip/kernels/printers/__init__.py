@@ -1,1 +1,1 @@
-"""Programs as text: LLVM assembly for the machine, Python to step through. Knows nodes only."""
+"""Programs as text: LLVM assembly for machine code, Python for debuggers, JavaScript for browsers."""

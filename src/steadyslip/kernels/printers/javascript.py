@@ -23,7 +23,7 @@ _OWN = {"abs", "sqrt"}
 
 
 def runtime(*code: str) -> str:
-    """Text of the module with the elementary functions; of some code only what that needs of it."""
+    """Source of `runtime.js` with the elementary functions; given some code, only the parts that the code needs."""
     whole = files("steadyslip.kernels.printers").joinpath("runtime.js").read_text(encoding="utf-8")
     if not code:
         return whole
@@ -46,7 +46,7 @@ def runtime_names() -> set[str]:
 
 
 def declared_names(*modules: str) -> list[str]:
-    """Names that modules declare at their outermost level."""
+    """Names that JavaScript modules declare at their outermost level."""
     names = [name for module in modules for name in _DECLARED.findall(module)]
     return names + [
         name for module in modules for line in _FURTHER[0].findall(module) for name in _FURTHER[1].findall(line)
@@ -54,7 +54,7 @@ def declared_names(*modules: str) -> list[str]:
 
 
 def as_script(*modules: str) -> str:
-    """Join modules into one scope, without their imports from each other and `export`.
+    """JavaScript modules joined into one scope, without `import` and `export`.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def as_script(*modules: str) -> str:
 
 
 def machine(programs: Sequence[Program], layout: Layout) -> str:
-    """JavaScript expression of a kernel: an object with its `layout` and `routines`, for the transpiled driver."""
+    """JavaScript expression for a kernel: an object with `layout` and `routines`, for the transpiled driver."""
     known = {program.name for program in programs}
     routines = ", ".join(name if name in known else "absent" for name in Routines._fields)
     functions = "".join(map(text, programs))
@@ -76,12 +76,12 @@ def machine(programs: Sequence[Program], layout: Layout) -> str:
 
 
 def text(program: Program) -> str:
-    """JavaScript function of a program, with arguments record, number, array."""
+    """JavaScript source of a program as a function of record, number and array."""
     return f"function {program.name}(R, x, y) {{\n{''.join(_JavaScript(program).body())}}}\n"
 
 
 def literal(value: Any) -> str:
-    """JavaScript literal of a number (also nan, inf) or bool."""
+    """JavaScript literal of a number (nan and inf included) or bool."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float) and not math.isfinite(value):
@@ -113,7 +113,7 @@ class _JavaScript(Writer):
         if node.op == "not":
             return f"(!{arguments[0]})"
         if node.op not in _OWN and node.op not in PRIMITIVES:
-            raise InternalError(f"no {node.op} in a program for JavaScript, which has no integers of 64 bits")
+            raise InternalError(f"a program for JavaScript without {node.op}, which needs integers of 64 bits")
         return f"{node.op}({', '.join(arguments)})"
 
     def named(self, name: str, value: str) -> str:

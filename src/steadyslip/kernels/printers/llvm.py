@@ -1,7 +1,7 @@
-"""Programs as LLVM assembly: scalar code for one record, vectors for lanes side by side.
+"""Programs as LLVM assembly: scalar code for one record, vector code for several lanes.
 
-In a program for lanes each operation is written for several vectors in turn: one chain of dependent operations would
-leave the processor idle for most of the time.
+In a program for lanes each operation is written for several vectors (chains) in turn, because a single chain of
+dependent operations would leave the processor idle for most of the time.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from steadyslip.kernels import primitives
 from steadyslip.kernels.layout import GROUP
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Node, Program, reachable
 
-_FAST = "nsz contract"  # freedom of the compiler: ignore the sign of zero, fuse multiplications with additions
+_FAST = "nsz contract"  # the compiler may ignore the sign of zero, and fuse multiplications with additions
 _REAL = {"add": f"fadd {_FAST}", "sub": f"fsub {_FAST}", "mul": f"fmul {_FAST}", "div": f"fdiv {_FAST}"}
 _WHOLE = {"add": "add", "sub": "sub", "mul": "mul", "and": "and", "or": "or", "shl": "shl", "shr": "ashr"}
 _COMPARE = {"lt": ("olt", "slt"), "le": ("ole", "sle"), "gt": ("ogt", "sgt"), "ge": ("oge", "sge")}
@@ -23,19 +23,19 @@ Lines = list[str]
 
 
 def assembly(programs: Sequence[Program], lanes: int, names: dict[str, str], pointer: str) -> str:
-    """Assembly of a module.
+    """LLVM assembly of a module with the given programs and the elementary functions that they use.
 
     Parameters
     ----------
     programs : sequence of Program
-        Programs named ``step`` or ``...lanes`` process all lanes, those named ``...group`` `GROUP` lanes from the one
-        that their number argument gives, others one record.
+        Programs named ``step`` or ``...lanes`` process all lanes; programs named ``...group`` process `GROUP` lanes, of
+        which the argument `number` is the first; others process one record.
     lanes : int
         One, or a multiple of `GROUP`.
     names : dict of str to str
         Symbol of each program.
     pointer : str
-        Type of a pointer to a double in this LLVM.
+        Type of a pointer to a double in this version of LLVM.
     """
     text, used = [], set()
     for program in programs:
@@ -64,7 +64,7 @@ def _suffix(width: int) -> str:
 
 @lru_cache(maxsize=64)
 def _primitive(name: str, width: int) -> str:
-    """Definition of an elementary function, which LLVM inlines."""
+    """Definition, in assembly, of an elementary function for vectors of a width; LLVM inlines it."""
     arguments = [Node("argument", (i,)) for i in range(2 if name in ("power", "asinh_exp") else 1)]
     result = getattr(primitives, name)(*arguments)
     writer = _Writer(width, "", chains=1)
@@ -81,7 +81,7 @@ def _primitive(name: str, width: int) -> str:
 
 
 class _Writer:
-    """Writer of one function."""
+    """Assembly of one function, for `chains` vectors of `width` lanes."""
 
     def __init__(self, lanes: int, pointer: str, chains: int = 0, apart: int = 0) -> None:
         self.pointer = pointer
@@ -114,7 +114,7 @@ class _Writer:
         return f"{head}{aligned} {{\nentry:\n{body}\n  ret void\n}}"
 
     def emit(self, nodes: Sequence[Node], loop: Loop | None = None) -> None:
-        """Write all nodes that belong to a loop, or to none."""
+        """Write all nodes that belong to a loop, or for None those outside loops."""
         for node in nodes:
             if node.order in self.values or node.loop is not loop:
                 continue
@@ -189,7 +189,7 @@ class _Writer:
         return name
 
     def _loop(self, loop: Loop) -> None:
-        """Write a loop as a block that is left after a fixed number of rounds."""
+        """Write a loop as a block that repeats for a fixed number of rounds."""
         if loop.results[0].order in self.values:
             return
         self.emit(reachable(loop.given))

@@ -1,4 +1,4 @@
-"""Programs as Python: slow and readable, to be stepped through."""
+"""Programs as Python: slow and readable, for debuggers and tests."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _OF_INTEGERS = {"shl": "<<", "shr": ">>"}
 
 
 def function(program: Program, steppable: bool = False) -> Callable[[Any, float, Any], None]:
-    """Python function of a program; if `steppable`, debuggers can show its lines."""
+    """Program as a Python function; if `steppable`, debuggers can show its source lines."""
     known = {name: _as_numpy(getattr(primitives, name)) for name in PRIMITIVES} | {"float64": np.float64}
     known |= {name: getattr(primitives, name) for name in ("bits", "real", "as_float")}
     found: dict[str, Any] = {}
@@ -35,12 +35,12 @@ def function(program: Program, steppable: bool = False) -> Callable[[Any, float,
 
 
 def _as_numpy(primitive: Callable[..., Any]) -> Callable[..., np.float64]:
-    """Primitive that returns NumPy floats, which can be divided by zero as those of a record can."""
+    """Primitive with NumPy floats as results, because division by zero must give inf or NaN, not an exception."""
     return lambda *given: np.float64(primitive(*given))
 
 
 def text(program: Program) -> str:
-    """Source of a program."""
+    """Python source of a program, as a function of record R, number x and array y."""
     return f"def {program.name}(R, x, y):\n" + ("".join(_Python(program).body()) or "    pass\n")
 
 
@@ -51,7 +51,7 @@ class _Python(Writer):
         return "math.nan" if math.isnan(value) else "math.inf" if value > 0 else "(-math.inf)"
 
     def select(self, condition: str, value: str, other: str) -> str:
-        # Python's own floats raise where they are divided by zero, and what follows from a literal may be a divisor.
+        # a literal becomes a NumPy float, because the value may be a divisor: Python's floats raise on division by zero
         value, other = (f"float64({one})" if _FLOAT.fullmatch(one) else one for one in (value, other))
         return f"({value} if {condition} else {other})"
 

@@ -1,4 +1,4 @@
-"""Programs as text of a language with expressions: values that are used once are inlined."""
+"""Base of printers for languages with expressions: values that are used only once are inlined."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _DEEPEST = 8  # most nested operations in one line, for readability
 
 
 class Writer(ABC):
-    """Writer of a program: names values used more than once, inlines the others.
+    """Base of printers: values used more than once get a name, other values are inlined.
 
     Attributes
     ----------
     lines : list of str
         Statements so far, indented.
     short : bool
-        True if what is loaded and used once has no name either; for pages, not for who steps through.
+        True to inline loads that are used once, which shortens pages; names are better for debuggers.
     """
 
     short = False
@@ -30,7 +30,7 @@ class Writer(ABC):
         self.program = program
         self.lines: list[str] = []
         self.known: dict[int, str] = {program.number.order: "x"}
-        self.signs: dict[int, str] = {}  # outermost operator of expressions in brackets
+        self.signs: dict[int, str] = {}  # outermost operator of each inlined expression in brackets, by node
         self.depth: dict[int, int] = {}
         self.uses: dict[int, int] = {}
         self.changed = {array for array, _, _ in program.stores}
@@ -53,15 +53,15 @@ class Writer(ABC):
 
     @abstractmethod
     def select(self, condition: str, value: str, other: str) -> str:
-        """Expression for `value` where the condition holds, else `other`."""
+        """Expression that is `value` if the condition is true, else `other`."""
 
     @abstractmethod
     def operation(self, node: Node, arguments: Sequence[str]) -> str:
-        """Expression for any operation whose syntax differs between languages."""
+        """Expression for an operation whose syntax differs between languages."""
 
     @abstractmethod
     def named(self, name: str, value: str) -> str:
-        """Statement that gives a value a new name, valid after a loop too."""
+        """Statement that assigns a value to a new name; the name must stay valid after a loop."""
 
     @abstractmethod
     def assigned(self, name: str, value: str) -> str:
@@ -69,7 +69,7 @@ class Writer(ABC):
 
     @abstractmethod
     def carried(self, name: str, value: str) -> str:
-        """Statement that declares a name whose value changes from round to round."""
+        """Statement that declares a name with its first value, for a value that changes from round to round."""
 
     @abstractmethod
     def rounds(self, count: int) -> str:
@@ -77,7 +77,7 @@ class Writer(ABC):
 
     @abstractmethod
     def following(self, names: Sequence[str], values: Sequence[str]) -> str:
-        """Statement that assigns all values to all names at once."""
+        """Statement that assigns values to names simultaneously."""
 
     def end(self) -> str:
         """End of a loop; empty for none."""
@@ -97,7 +97,7 @@ class Writer(ABC):
         self.lines.append("    " * level + statement + "\n")
 
     def emit(self, nodes: Sequence[Node], level: int, loop: Loop | None = None) -> None:
-        """Write all nodes that belong to a loop, or to none."""
+        """Write all nodes that belong to a loop, or for None those outside loops."""
         for node in nodes:
             if node.order in self.known or node.loop is not loop:
                 continue
@@ -131,11 +131,11 @@ class Writer(ABC):
         return f"(-{a[0]})" if node.op == "neg" else self.operation(node, a)
 
     def bare(self, node: Node) -> str:
-        """Expression of a node without its outer brackets, if it has any."""
+        """Expression of a node without outer brackets."""
         return self.known[node.order][1:-1] if node.order in self.signs else self.known[node.order]
 
     def _beside(self, node: Node) -> tuple[str, str]:
-        """Both operands, without brackets that do not change the order of operations."""
+        """Expressions of both operands, without brackets that are not needed for the order of operations."""
         signs = [self.signs.get(operand.order, "") for operand in node.operands]
         product, compares = node.op in _PRODUCTS, node.op not in _SUMS | _PRODUCTS
         spare = _PRODUCTS if product else _SUMS | _PRODUCTS, _SUMS | _PRODUCTS if compares else _PRODUCTS
@@ -155,7 +155,7 @@ class Writer(ABC):
         self.emit(loop.nodes, level + 1, loop)
         values = [self.known[node.order] for node in loop.following]
         if {self.known[node.order] for node in loop.results} & set(names):
-            raise ValueError("a result of a loop is what it leaves, not what it began with")
+            raise ValueError("a result of a loop must be a value computed in a round, not a carried value at its start")
         self.line(level + 1, self.following(names, values))
         if self.end():
             self.line(level, self.end())

@@ -73,14 +73,14 @@ class _Module:
         self.local: set[str] = set()
 
     def refuse(self, node: ast.AST, what: str) -> NotAvailable:
-        """Error that names unsupported syntax and its position."""
+        """NotAvailable error for unsupported syntax (`what`), with its module and line."""
         return NotAvailable(
             f"{self.name}, line {getattr(node, 'lineno', '?')}: {what} cannot be written in JavaScript; drivers may "
             "use numbers, arrays that are indexed, functions with positional arguments, for over range, while and if"
         )
 
     def text(self, tree: ast.Module) -> str:
-        """All functions; constants and imports are inlined by their values."""
+        """JavaScript of all functions of the module; constants and imports are replaced by their values."""
         lines: list[str] = []
         for node in tree.body:
             if isinstance(node, ast.FunctionDef):
@@ -178,7 +178,7 @@ class _Module:
                     raise self.refuse(node, "a range with a step that is no rising number or name")
                 step = bounds[2] if len(bounds) > 2 else "1"
                 return f"let {i} = {start}, end_{i} = {stop}; {i} < end_{i}; {i} += {step}"
-        raise self.refuse(node, "for over anything but a range or a few numbers")
+        raise self.refuse(node, "for over anything but a range or a tuple of numbers")
 
     def _rises(self, step: ast.expr) -> bool:
         return isinstance(step, ast.Name) or (

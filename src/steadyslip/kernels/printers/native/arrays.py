@@ -28,12 +28,12 @@ def argument(text: str) -> tuple[str, int]:
 
 
 def entry(symbol: str, called: tuple[str, str], types: Sequence[str], constant: int, opaque: bool) -> list[str]:
-    """Function callable from Python with arrays and integers, which checks them and calls another one.
+    """Assembly of a function that Python calls with arrays and integers; it checks them and calls another function.
 
     Parameters
     ----------
     symbol : str
-        Its symbol.
+        Symbol of the new function.
     called : tuple of str
         Symbol of the called function, and kind of its result: ``int`` or ``none``.
     types : sequence of str
@@ -46,8 +46,8 @@ def entry(symbol: str, called: tuple[str, str], types: Sequence[str], constant: 
     Returns
     -------
     list of str
-        Lines. The function returns the result of the other one (which must not be negative; 0 if none), or -1 - i if
-        argument i is not of its declared type.
+        Lines. The new function returns the result of the called one (which must be >= 0; 0 for none), or -1 - i if
+        argument i does not have its declared type.
     """
     body, given = Lines(opaque), list[Operand]()
     for i, text in enumerate(types):
@@ -60,14 +60,14 @@ def entry(symbol: str, called: tuple[str, str], types: Sequence[str], constant: 
 
 
 def types_of(types: Sequence[str], constant: int) -> tuple[Type, ...]:
-    """Types of the arguments within a translated function."""
+    """Types of the arguments inside a translated function."""
     declared = [argument(text) for text in types]
     return tuple(ArrayView(kind, "", ("",) * count, i < constant).type if count else kind
                  for i, (kind, count) in enumerate(declared))  # fmt: skip
 
 
 def _array(body: Lines, place: int, kind: str, count: int, is_constant: bool) -> ArrayView:
-    """View of the array at the address given by an argument; the function returns early if it is not as declared."""
+    """View of the array whose address is an argument; the written code returns early if its type is not as declared."""
 
     def at(address: str, offset: int, what: str) -> str:
         moved = body.name(f"add i64 {address}, {offset}")
@@ -97,7 +97,7 @@ def _array(body: Lines, place: int, kind: str, count: int, is_constant: bool) ->
 
 
 def new_array(body: Lines, sizes: Sequence[str], slot: str) -> ArrayView:
-    """New array of zeros; its address is stored in `slot`, for `free_array`."""
+    """Write the allocation of an array of zeros, whose address is stored in `slot`; returns a view of it."""
     total = sizes[0]
     for size in sizes[1:]:
         total = body.name(f"mul nsw i64 {total}, {size}")
@@ -108,7 +108,7 @@ def new_array(body: Lines, sizes: Sequence[str], slot: str) -> ArrayView:
 
 
 def free_array(body: Lines, slot: str) -> None:
-    """Free an array made by `new_array`."""
+    """Write the release of an array that `new_array` has allocated."""
     pointer = body.pointer("real")
     found = body.name(f"load {pointer}, {body.pointer(pointer)} {slot}")
     body.add(f"call void @{MEMORY[1]}({pointer} {found})")

@@ -22,7 +22,7 @@ _MATH = {"nan": math.nan, "inf": math.inf}
 
 
 class Others(Protocol):
-    """Other functions of the translation, as one function needs them."""
+    """Access of one function's translator to the other functions."""
 
     opaque: bool
     functions: dict[str, tuple[ast.FunctionDef, str]]
@@ -44,7 +44,7 @@ class Expressions:
     Parameters
     ----------
     others : Others
-        All functions.
+        Access to the other functions.
     module : str
         Module of the function, for messages.
     numbers : mapping of str to float
@@ -56,12 +56,12 @@ class Expressions:
         self.lines = Lines(others.opaque)
         self.variables: dict[str, _Variable] = {}
         self.tuples: dict[str, TupleValue] = {}
-        self.loops: list[tuple[str, str]] = []  # labels where continue and break lead
-        self.arrays_made: list[str] = []  # stack slots with the addresses of arrays that the function makes
+        self.loops: list[tuple[str, str]] = []  # labels to which continue and break jump, innermost loop last
+        self.arrays_made: list[str] = []  # stack slots with the addresses of arrays that the function allocates
         self.choices = 0
 
     def refuse(self, node: ast.AST, what: str) -> NotAvailable:
-        """Error that names unsupported syntax and its position."""
+        """NotAvailable error for unsupported syntax (`what`), with its module and line."""
         return NotAvailable(
             f"{self.module}, line {getattr(node, 'lineno', '?')}: {what} cannot be translated; drivers may use "
             "numbers, arrays that are indexed, functions with positional arguments, for over range, while and if"
@@ -112,14 +112,14 @@ class Expressions:
         return real(value) if isinstance(value, float) else Scalar("int", str(int(value)))
 
     def _as(self, node: ast.AST, value: Operand, kind: str) -> Scalar:
-        """Value converted to a kind of number; an error if that is not possible."""
+        """Value converted to a kind (real, int, bool); raises an error if that is not possible."""
         found = self.lines.converted(value, kind) if isinstance(value, Scalar) else None
         if found is None:
             raise self.refuse(node, f"{ast.unparse(node) if isinstance(node, ast.expr) else 'what it gets'} as {kind}")
         return found
 
     def _branches(self, test: ast.expr, yes: Callable[[], None], no: Callable[[], None]) -> None:
-        """Write an if statement from functions that write both branches."""
+        """Write an if statement; `yes` and `no` are functions that write its branches."""
         lines = self.lines
         then, other, done = lines.label("then"), lines.label("else"), lines.label("done")
         lines.fork(self._truth(test), then, other)
@@ -132,10 +132,10 @@ class Expressions:
     # -- expressions
 
     def _truth(self, node: ast.expr) -> str:
-        """Condition as assembly; a number is compared with zero."""
+        """Assembly name of a condition; a number is compared with zero."""
         value = self._value(node)
         if not isinstance(value, Scalar) or value.kind == "none":
-            raise self.refuse(node, "a condition that is no number")
+            raise self.refuse(node, "a condition that is not a number or bool")
         if value.kind == "bool":
             return value.text
         zero = real(0.0).text if value.kind == "real" else "0"
@@ -212,7 +212,7 @@ class Expressions:
         return ArrayView(found.kind, self.lines.place(found, places), found.sizes[len(places) :], found.is_constant)
 
     def _pair(self, left: ast.expr, right: ast.expr) -> tuple[Scalar, Scalar]:
-        """Two numbers converted to a common kind."""
+        """Both operands, converted to a common kind (real or int)."""
         a, b = self._numeric(left), self._numeric(right)
         kind = "real" if "real" in (a.kind, b.kind) else "int"
         return self._as(left, a, kind), self._as(right, b, kind)
@@ -243,7 +243,7 @@ class Expressions:
         return Scalar("bool", found)
 
     def _connected(self, all_of_them: bool, values: Sequence[ast.expr]) -> Scalar:
-        """``and`` or ``or``; later operands are evaluated only if needed."""
+        """Result of ``and`` or ``or``, whose later operands are evaluated only if needed."""
         lines = self.lines
         slot, done = lines.slot("bool"), lines.label("done")
         for i, one in enumerate(values):
@@ -260,7 +260,7 @@ class Expressions:
     def _either(self, test: ast.expr, yes: ast.expr, no: ast.expr) -> Operand:
         """Conditional expression; only the chosen value is evaluated."""
         self.choices += 1
-        name = f"either {self.choices}"  # has a space, so it is no name of Python
+        name = f"either {self.choices}"  # has a space, so that it differs from all Python names
         mixed = {"real", "int"} == {self._type(yes), self._type(no)}
 
         def written(node: ast.expr) -> None:
@@ -271,7 +271,7 @@ class Expressions:
         return self._held(test, name)
 
     def _type(self, node: ast.expr) -> Type:
-        """Type of an expression; the lines written to find it are discarded."""
+        """Type of an expression, found by translating it and discarding the lines."""
         lines, made, known = self.lines, list(self.arrays_made), dict(self.variables)
         self.lines = Lines(self.others.opaque)
         try:
@@ -315,7 +315,7 @@ class Expressions:
         return arrays.new_array(self.lines, sizes, self.arrays_made[-1])
 
     def _function(self, node: ast.expr, name: str, given: Sequence[ast.expr]) -> Operand:
-        """Call of another driver function; numbers are converted to its declared types."""
+        """Result of a call of another driver function; numbers are converted to its annotated types."""
         heads = self.others.functions[name][0].args.args
         if len(heads) != len(given):
             raise self.refuse(node, f"a call of {name} with {len(given)} arguments")
@@ -328,7 +328,7 @@ class Expressions:
         return self.lines.call(symbol, result, values)
 
     def _routine(self, given: Sequence[ast.expr]) -> Scalar:
-        """Call of a model's routine by its address."""
+        """Write a call of a model's routine by its address; it has no result."""
         lines, array = self.lines, self.lines.pointer("real")
         record, changed = self._array_of(given[1]), self._array_of(given[3])
         number = self._as(given[2], self._value(given[2]), "real")

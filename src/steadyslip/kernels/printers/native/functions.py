@@ -1,9 +1,9 @@
-"""Translation of the driver's modules to LLVM assembly: the subset of Python of `transpile`, with types.
+"""Translation of the driver's modules to LLVM assembly: the same subset of Python as for `transpile`, with types.
 
 A variable keeps the type of its first assignment: number, bool, array, or tuple of these. Arguments and results have
-their annotated types; arrays have the element kind and number of indices of the call, and are contiguous. An array with
-fewer indices than dimensions is a view. Arrays that a function makes are freed at its end. Anything else raises an
-error with module and line.
+their annotated types; arrays are contiguous, with the element kind and number of indices that the caller passes. An
+array with fewer indices than dimensions is a view. Arrays that a function allocates are freed at its end. Any other
+Python raises an error with module and line.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def translated(
     modules: Mapping[str, str], entries: Mapping[str, Sequence[str]], symbols: Mapping[str, str], constant: int,
     opaque: bool,
 ) -> str:  # fmt: skip
-    """Assembly of functions of some modules that are called from Python, and of all that they need.
+    """Assembly of functions of some modules that are called from Python, and of all functions that they call.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def translated(
     symbols : mapping of str to str
         Symbol of each function.
     constant : int
-        Number of leading arguments of each that are arrays that never change.
+        Number of leading arguments of each function that are arrays whose elements never change.
     opaque : bool
         True if pointers of this LLVM have no element type.
 
@@ -64,7 +64,7 @@ def translated(
 
 
 class _Whole:
-    """All functions that are needed, each translated once per combination of argument types."""
+    """Registry of the translated functions; each is translated once per combination of argument types."""
 
     def __init__(self, modules: Mapping[str, str], opaque: bool) -> None:
         self.opaque = opaque
@@ -80,7 +80,7 @@ class _Whole:
                     self.functions[node.name] = (node, module)
 
     def called(self, name: str, types: tuple[Type, ...]) -> tuple[str, str]:
-        """Symbol of a function for given argument types, and kind of its result."""
+        """Symbol of a function for given argument types, and kind of its result; schedules its translation."""
         key = (name, types)
         if key not in self.known:
             node, module = self.functions[name]
@@ -104,7 +104,7 @@ class _Function(Expressions):
             raise self.refuse(node, f"the result of {node.name}")
 
     def written(self) -> list[str]:
-        """Lines of the definition of the function."""
+        """Lines of assembly that define the function."""
         heads: list[str] = []
         for argument, type_ in zip(self.node.args.args, self.types, strict=True):
             value = self._received(type_, heads)
@@ -126,7 +126,7 @@ class _Function(Expressions):
         return self.lines.pointer("real")
 
     def _received(self, type_: Type, heads: list[str]) -> Operand:
-        """Argument of the function; its parts are appended to `heads`."""
+        """Value of an argument inside the function; its declarations are appended to `heads`."""
         if not isinstance(type_, str):
             return TupleValue(tuple(self._received(one, heads) for one in type_))
         kind, count = arrays.argument(type_.removeprefix("constant "))
@@ -183,7 +183,7 @@ class _Function(Expressions):
         self.loops.pop()
 
     def _loop(self, node: ast.For, name: str, over: ast.expr, body: Sequence[ast.stmt]) -> None:
-        """Loop over a range, or over a few values, with the body written once for each."""
+        """Write a loop over a range; for a loop over a tuple of values the body is written once for each value."""
         lines = self.lines
         if isinstance(over, ast.Tuple):
             done = lines.label("done")
@@ -197,12 +197,12 @@ class _Function(Expressions):
             lines.begin(done)
             return
         if not (isinstance(over, ast.Call) and ast.unparse(over.func) == "range" and 0 < len(over.args) < 4):
-            raise self.refuse(node, "for over anything but a range or a few numbers")
+            raise self.refuse(node, "for over anything but a range or a tuple of numbers")
         bounds = [self._whole_number(one) for one in over.args]
         start, stop = (bounds[0], bounds[1]) if len(bounds) > 1 else ("0", bounds[0])
         step = bounds[2] if len(bounds) > 2 else "1"
         if step.startswith("-"):
-            raise self.refuse(node, "a range that falls")
+            raise self.refuse(node, "a range with a negative step")
         check, inside, again, done = (lines.label(what) for what in ("check", "inside", "again", "done"))
         count = lines.slot("int")
         lines.put(Scalar("int", start), count)
@@ -220,12 +220,12 @@ class _Function(Expressions):
         lines.begin(done)
 
     def _assigned(self, targets: Sequence[ast.expr], value: ast.expr) -> None:
-        """Assignment; the values of tuples targets are all computed before the first is stored."""
+        """Write an assignment; all values of a tuple are computed before the first is stored."""
         match targets:
             case [ast.Tuple(elts=parts)]:
                 found = self._value(value)
                 if not isinstance(found, TupleValue) or len(found.values) != len(parts):
-                    raise self.refuse(value, "unpacking of anything but as many values")
+                    raise self.refuse(value, "unpacking of anything but a tuple of the same length")
                 for part, one in zip(parts, found.values, strict=True):
                     self._write(part, one)
             case [ast.Name(id=name)] if isinstance(value, ast.Tuple):

@@ -6,10 +6,10 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-_FAST = "nsz contract"  # freedom of the compiler, as in `llvm`: ignore the sign of zero, fuse multiply-add
+_FAST = "nsz contract"  # the compiler may ignore the sign of zero, and fuse multiplications with additions
 TEXT = {"real": "double", "int": "i64", "bool": "i1", "none": "void"}
 MEMORY = ("PyMem_RawCalloc", "PyMem_RawFree")
-"""Functions of Python that have to be known when the assembly is linked."""
+"""Functions of the Python C API for allocation; their addresses are given to LLVM for linking."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Scalar:
 
 @dataclass(frozen=True)
 class ArrayView:
-    """Array: kind of elements, pointer to the first, number along each index, True if elements never change."""
+    """Array: kind of its elements, pointer to the first, size along each index, True if elements never change."""
 
     kind: str
     pointer: str
@@ -59,7 +59,7 @@ def real(number: float) -> Scalar:
 
 
 class Lines:
-    """Lines of a function, with fresh names.
+    """Lines of assembly of one function, with methods that append instructions and make unused names.
 
     Parameters
     ----------
@@ -74,20 +74,20 @@ class Lines:
         self.count = 0
 
     def pointer(self, kind: str) -> str:
-        """Type of a pointer to a kind of number, or to a type of the assembly."""
+        """Assembly type of a pointer to a kind (``real``, ``int``, ``bool``) or to an assembly type."""
         return "ptr" if self.opaque else f"{TEXT.get(kind, kind)}*"
 
     def add(self, line: str) -> None:
         self.lines.append(f"  {line}")
 
     def name(self, line: str) -> str:
-        """Fresh name for the result of an instruction."""
+        """Append an instruction; returns the new name of its result."""
         self.count += 1
         self.add(f"%t{self.count} = {line}")
         return f"%t{self.count}"
 
     def label(self, what: str) -> str:
-        """Fresh label."""
+        """New label that begins with the given text."""
         self.count += 1
         return f"{what}{self.count}"
 
@@ -103,7 +103,7 @@ class Lines:
     # -- variables
 
     def slot(self, kind: str) -> str:
-        """Stack slot for a value of a kind, allocated at the start of the function."""
+        """Name of a new stack slot for a value of a kind, allocated at the start of the function."""
         self.count += 1
         self.heads.append(f"  %r{self.count} = alloca {TEXT.get(kind, kind)}")
         return f"%r{self.count}"
@@ -118,7 +118,7 @@ class Lines:
     # -- arrays
 
     def place(self, array: ArrayView, indices: Sequence[str]) -> str:
-        """Pointer to an element, or to the first of those that share the first indices."""
+        """Name of a pointer to an element, or with fewer indices to the first element of a view."""
         offset = ""
         for i, size in enumerate(array.sizes):
             if offset and offset != "0":
@@ -136,7 +136,7 @@ class Lines:
     # -- calls
 
     def flat(self, value: Operand) -> list[tuple[str, str]]:
-        """Types and names of a value as arguments of a call."""
+        """Assembly types and names of the parts of a value, as passed in a call."""
         if isinstance(value, Scalar):
             return [(TEXT[value.kind], value.text)]
         if isinstance(value, ArrayView):
@@ -144,7 +144,7 @@ class Lines:
         return [one for part in value.values for one in self.flat(part)]
 
     def call(self, symbol: str, result: str, given: Sequence[Operand]) -> Scalar:
-        """Result of a call of a function."""
+        """Append a call of a function; returns its result, of the kind `result`."""
         arguments = ", ".join(f"{kind} {text}" for kind, text in self.flat(TupleValue(tuple(given))))
         line = f"call {TEXT[result]} {symbol}({arguments})"
         if result == "none":
@@ -155,7 +155,7 @@ class Lines:
     # -- numbers
 
     def converted(self, value: Scalar, kind: str) -> Scalar | None:
-        """Value converted to another kind of number; None if that is not possible."""
+        """Value converted to another kind; None if that is not possible."""
         if value.kind == kind:
             return value
         if value.kind == "int" and kind == "real" and value.text.lstrip("-").isdigit():
@@ -171,7 +171,7 @@ class Lines:
         return Scalar(kind, self.name(f"{line} {left}, {right}"))
 
     def compared(self, how: tuple[str, str], kind: str, left: str, right: str) -> Scalar:
-        """Comparison; `how` is its name for real numbers and for others."""
+        """Result of a comparison; `how` has its names in LLVM for real numbers and for integers."""
         line = f"fcmp {how[0]} double" if kind == "real" else f"icmp {how[1]} {TEXT[kind]}"
         return Scalar("bool", self.name(f"{line} {left}, {right}"))
 

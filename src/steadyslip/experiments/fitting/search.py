@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.condensed import Condensed, condensed_along
 from steadyslip.experiments.fitting.effort import Effort, work_of_search
+from steadyslip.experiments.fitting.growing import grown, several_changes
 from steadyslip.experiments.fitting.nested import NestedModel, nested_models
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.starts import features_of, search_bounds, starting_points
@@ -124,8 +126,9 @@ def find_minimum(
 ) -> SearchResult:
     """Search for the least sum of squares of a plan.
 
-    The first round tries `FIRST_STARTS` starts. More rounds follow until several starts agree and the residuals are
-    white noise, or until four times as many as asked for have been tried. Where the model contains simpler (nested)
+    The first round tries `FIRST_STARTS` starts, the second, where the normal stress changes, such as follow more and
+    more of the record (`growing`). More rounds follow until several starts agree and the residuals are white noise, or
+    until four times as many as asked for have been tried. Where the model contains simpler (nested)
     ones, their minima are further starts. When the budget of the search is spent it returns the best minimum so far. A
     nested model has the budget of a fit of its own, so that it ends where a separate fit of it ends.
 
@@ -136,7 +139,10 @@ def find_minimum(
     """
     search = _Search(plan, starts, effort, progress)
     third = -(-starts // 3)
-    for upto in dict.fromkeys((min(FIRST_STARTS, third), third, starts, 2 * starts, 3 * starts, 4 * starts)):
+    rounds = [*dict.fromkeys((min(FIRST_STARTS, third), third, starts, 2 * starts, 3 * starts, 4 * starts))]
+    if several_changes(plan):
+        rounds.insert(1, rounds[0])
+    for upto in rounds:
         search.try_starts(upto)
         last = search.allowance.was_met
         if not search.any_followed:
@@ -185,7 +191,9 @@ class _Search:
     Attributes
     ----------
     rough : Minima
-        Ends of all starts on few samples.
+        Ends of all starts on few samples, those that grow with the record included.
+    grown : int
+        Number of these.
     best : Minima
         Ends of the finalists on condensed samples, or on all samples if none are condensed.
     finalists : ndarray (m, p)
@@ -206,6 +214,7 @@ class _Search:
         self.features = features_of(self.whole.parts)
         self.low, self.high = search_bounds(self.whole.parts, self.features, self.whole.space)
         self.rough = self.best = Minima.none(len(self.whole.space))
+        self.grown = 0
         self.condensed: Comparison | Condensed = self.whole
         self.finalists = self.best.coordinates
         self.arrived = 0
@@ -232,15 +241,22 @@ class _Search:
         return report
 
     def try_starts(self, upto: int) -> None:
-        """Minimise on few samples from further starting points, until `upto` have been tried."""
-        already = len(self.rough.ssq)
-        begin = starting_points(self.whole.parts, self.features, self.whole.space, upto - already, already)
+        """Minimise on few samples from further starting points, until `upto` have been tried; then from grown ones."""
+        already = len(self.rough.ssq) - self.grown
+        count = upto - already or FIRST_STARTS
+        begin = starting_points(self.whole.parts, self.features, self.whole.space, count, already % upto)
         self.allowance = self.stages[0]
-        self.rough = self.rough + minimise(
-            lambda z, _: self.rough_model.residuals(z), begin, self.low, self.high, most=ROUGH_ITERATIONS,
-            tolerance=1e-4, race=MIN_ARRIVED,
-            callback=self.reporter("searching", self.rough_model), stop=self.allowance,
-        )  # fmt: skip
+        options: Any = {
+            "most": ROUGH_ITERATIONS, "tolerance": 1e-4, "race": MIN_ARRIVED, "stop": self.allowance,
+            "callback": self.reporter("searching", self.rough_model),
+        }  # fmt: skip
+        if upto == already:
+            effort = replace(self.effort, patience=ROUGH_PATIENCE, growth=ROUGH_GROWTH)
+            ends = grown(self.rough_plan, begin, self.low, self.high, effort, options)
+            self.grown += len(ends.ssq)
+        else:
+            ends = minimise(lambda z, _: self.rough_model.residuals(z), begin, self.low, self.high, **options)
+        self.rough = self.rough + ends
 
     def refine_finalists(self) -> None:
         """Refine the finalists on condensed samples (all, if none are condensed) and count the starts that agree."""

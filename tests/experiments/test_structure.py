@@ -98,6 +98,7 @@ def test_what_correlated_noise_hides_is_told(wrong, choice, seed):
     fit, said = fitted(one_step(wrong, seed))
     assert next((one.choice for one in fit.remedies), None) == choice
     assert ("another model follows the records better" in said or "residuals have structure" in said) == bool(choice)
+    assert ("a trend and a second state of long slip distance look alike here" in said) == (wrong == "trend")
 
 
 @pytest.mark.campaign

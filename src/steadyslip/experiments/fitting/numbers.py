@@ -18,7 +18,14 @@ from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes, opened, stress_alone
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.refit import RampFit, driven_as_measured, with_ramps
-from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, continued, mended, remedies
+from steadyslip.experiments.fitting.remedies import (
+    STRONG_EVIDENCE,
+    Remedy,
+    continued,
+    mended,
+    remedies,
+    slow_state,
+)
 from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
@@ -135,6 +142,8 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
 
         Where one fits better, or another law with one, the text says so, as it does where residuals have structure.
         """
+        if self.plan.trend and self.search.converged:
+            return self._without_weakening()
         forgets = forgets_changes(self.plan)
         if not ((forgets or stress_alone(self.plan)) and self.search.converged) or self.whiteness.p < STRUCTURE:
             return self
@@ -154,6 +163,19 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         same = replace(self, covariance=covariance, unidentified=self.unidentified + found,
                        joint=self._joint(self._minimum, covariance, near))  # fmt: skip
         same.__dict__["remedies"] = tuple(one.remedy for one in rivals)
+        return same
+
+    def _without_weakening(self) -> Self:
+        """The same fit, without b and a - b where a second state of long slip distance fits as well as its trend."""
+        slow = slow_state(self.plan, self.ssq, self.plan, self.values)
+        if slow is None or slow.gain < -STRONG_EVIDENCE:
+            return self
+        lost = np.array([one.kind == "evolution effect" for one in self.space.unknowns])
+        covariance = np.where(lost | lost[:, None], 0.0, self.covariance)
+        covariance[lost, lost] = np.inf
+        same = replace(self, covariance=covariance, joint={})
+        if self.whiteness.p >= STRUCTURE:
+            same.__dict__["remedies"] = (slow,)
         return same
 
     def with_variants(self) -> Self:

@@ -19,6 +19,8 @@ from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.plan import Plan, with_lag
 from steadyslip.experiments.fitting.planning import can_be_free
 from steadyslip.experiments.fitting.search import MAX_ITERATIONS, SearchResult, find_minimum, first_computable
+from steadyslip.experiments.fitting.starts import features_of, search_bounds
+from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, minimise
 from steadyslip.experiments.numerics.noise import STRUCTURE, describe, whiteness
 from steadyslip.laws.friction import FrictionLaw
@@ -32,6 +34,8 @@ MEMORY_EFFORT = 0.1  # of trials with the memory of normal stress that a law lac
 MAX_TREND = 2  # orders of a trend that are tried
 SMALL_FALL = 0.1  # of −2 log likelihood of white noise, which a short search leaves to be gained: nobody would see it
 
+SLOWER = np.geomspace(3.0, 300.0, 8)  # slip distances of a second state that are tried, in those of the first
+TWO_STATES = "two states"
 WEAKENING = "a - b"
 
 NESTED = {"lag", "trend"}
@@ -105,6 +109,10 @@ def remedies(plan: Plan, ssq: float, values: Mapping[str, float], rounds: int = 
             if (one := _fitted(own, plan, ssq, size, values, share)) is not None:
                 tried.append((one, own))
         found += [one for one, _ in tried]
+        trends = [(one, own) for one, own in tried if own.trend > base.trend and one.gain > STRONG_EVIDENCE]
+        found += [
+            slow for one, own in trends if (slow := slow_state(plan, one.ssq, own, one.values, one.gain)) is not None
+        ]
         if _is_mended(one for one, other in tried if not any(lacks) or _recalls(other, base)):
             break
         best = max(tried, key=lambda pair: pair[0].gain, default=None)
@@ -152,7 +160,11 @@ def continued(plan: Plan, ssq: float, values: Mapping[str, float]) -> float:
 
 
 def _ranked(found: list[Remedy]) -> tuple[Remedy, ...]:
-    return tuple(sorted(found, key=lambda one: -one.gain))
+    """Remedies, the best first, each choice once; a trend before more states that are not better by strong evidence."""
+    trend = any("fit.trend" in one.choice for one in found)
+    own = {one.choice: one for one in sorted(found, key=lambda one: one.gain)}.values()
+    ahead = {one.choice: STRONG_EVIDENCE * (trend and "fit.states" in one.choice) for one in own}
+    return tuple(sorted(own, key=lambda one: ahead[one.choice] - one.gain))
 
 
 def _changed(plan: Plan) -> Iterator[Plan]:
@@ -265,6 +277,61 @@ def _from_minimum(
     if not np.isfinite(ends.ssq[0]):
         raise NotAvailable("the model cannot follow these records")
     return FoundMinimum(comparison, ends.coordinates[0], float(ends.ssq[0]))
+
+
+def slow_state(
+    plan: Plan, ssq: float, with_trend: Plan, values: Mapping[str, float], gain: float = 0.0
+) -> Remedy | None:  # fmt: skip
+    """Minimum with a second state of long slip distance in place of the last order of a trend; None for other laws.
+
+    A state whose slip distance is longer than what slides after a step evolves along a straight line, as a trend does,
+    but a - b is another.
+
+    Parameters
+    ----------
+    plan : Plan
+        That the remedy is one of.
+    ssq : float
+        Sum of squares with the trend.
+    with_trend : Plan
+        Plan with the trend.
+    values : mapping of str to float
+        Values of its fit, by name of the unknown, from which the search begins.
+    gain : float, optional
+        Of the trend. That of the state is counted from there: numbers of independent samples in the residuals of both
+        differ by more than what tells one from the other.
+    """
+    if TWO_STATES not in with_trend.rig.friction.alternatives() or len(_evolving(with_trend)) != 1:
+        return None
+    own = with_words(replace(with_trend, trend=with_trend.trend - 1), [TWO_STATES])
+    space, effort = own.space(), _effort(own, MEMORY_EFFORT)
+    comparison = own.for_trial().comparison(effort)
+    begin = np.empty((len(SLOWER), len(space)))
+    for i, one in enumerate(space.unknowns):
+        begin[:, i] = one.coordinate(values[one.name] if one.name in values else _of_state(with_trend, one, values))
+    low, high = search_bounds(comparison.parts, features_of(comparison.parts), space)
+    ends = minimise(
+        lambda x, _: comparison.residuals(x), np.clip(begin, low, high), low, high, MAX_ITERATIONS, race=1,
+        tolerance=SMALL_FALL / comparison.size, stop=effort.budget.part(np.inf), damping=DAMPING_NEAR,
+    )  # fmt: skip
+    ends = first_computable(comparison, ends.sorted())
+    if not np.isfinite(ends.ssq[0]):
+        return None
+    found = remedy(with_trend, own, comparison, ends.coordinates[0], ssq, len(with_trend.space()))
+    return replace(found, choice=_choice(plan, own), gain=gain + found.gain)
+
+
+def _evolving(plan: Plan) -> tuple[str, ...]:
+    return plan.rig.of_kind("evolution effect")
+
+
+def _of_state(plan: Plan, one: Unknown, values: Mapping[str, float]) -> Array | float:
+    """Starting values of an unknown of the first or second state, from those of the only state of another plan."""
+    known = _evolving(plan)[0] if one.kind == "evolution effect" else "friction.d_c"
+    value = values.get(known, values.get(f"{known}@1", plan.rig.value(known) or 0.0))
+    if ".states.2." not in one.parameter:
+        return value
+    return np.asarray(value * SLOWER) if one.kind == "slip distance" else 0.0
 
 
 def _choice(plan: Plan, other: Plan) -> str:

@@ -224,6 +224,8 @@ def _structure(fit: FitNumbers) -> list[str]:
     if best is None and structure:
         tried = "; ".join(one.choice for one in fit.remedies)
         return [f"{said}; none that was tried makes the fit better ({tried}): the machine's own noise, or another law"]
+    if best is None and fit.plan.trend and fit.remedies:
+        return [f"residuals are noise; {_as_slow_state(fit, fit.remedies[0])}"]
     if best is None:
         if not forgets and fit.remedies:
             said = f"only the normal stress changes in {enumerated(changing)}"
@@ -237,11 +239,27 @@ def _structure(fit: FitNumbers) -> list[str]:
     ]
 
 
+def _near(fit: FitNumbers, best: Remedy) -> list[Remedy]:
+    """Other models that the records hardly tell from the best."""
+    return [one for one in fit.remedies if one is not best and best.gain - one.gain < STRONG_EVIDENCE <= one.gain]
+
+
+def _as_slow_state(fit: FitNumbers, one: Remedy) -> str:
+    """Clause on a second state of long slip distance that fits as well as the trend of a fit."""
+    before = weakening(fit.rig(0), fit.values)
+    return (
+        f"{_asked(fit, one)} in place of the trend fits as well (BIC {-one.gain:+.1f}), with {WEAKENING} "
+        f"{one.values[WEAKENING]:.2g} in place of {before:.2g}: these data do not determine a - b; slide further after "
+        "each step, or give (fix) what is known of b"
+    )
+
+
 def _rivals(fit: FitNumbers, best: Remedy) -> str:
     """Clause on other models that the records hardly tell from the best of those that were tried."""
-    near = [one for one in fit.remedies if one is not best and best.gain - one.gain < STRONG_EVIDENCE <= one.gain]
+    near = _near(fit, best)
     said = [
-        f"{_asked(fit, one)} (BIC {best.gain - one.gain:.1f} more, {', '.join(_moved(fit, one)) or 'the rest alike'})"
+        f"{_asked(fit, one)} (BIC {abs(best.gain - one.gain):.1f} {'less' if one.gain > best.gain else 'more'}, "
+        f"{', '.join(_moved(fit, one)) or 'the rest alike'})"
         for one in near
     ]
     return f" hardly told from that: {enumerated(said)};" if near else ""
@@ -249,6 +267,12 @@ def _rivals(fit: FitNumbers, best: Remedy) -> str:
 
 def _consequence(fit: FitNumbers, best: Remedy) -> str:
     """What a better model means for the values: whether it moves one by more than its error, or gives one none."""
+    choices = [one.choice for one in (best, *_near(fit, best))]
+    if all(any(f"fit.{word} =" in choice for choice in choices) for word in ("trend", "states")):
+        return (
+            "a trend and a second state of long slip distance look alike here, so that these data do not determine "
+            "a - b; do not use the values above, but"
+        )
     steep = _steep_names(fit.rig(0))
     shared = [n for n in steep if n in best.values and n in fit.values]
     shifts = [(best.values[n] - fit.values[n], fit.errors[n]) for n in shared]

@@ -39,7 +39,7 @@ def assemble(
     drive : str
         `MOVED`, `PULLED` or `EITHER`: the drive moves, its force is imposed, or both alternate.
     order : int
-        Polynomials of each late signal in a Model for motion; 0 for one with delays.
+        Number of polynomials that represent each delayed signal in a Model for motion; 0 keeps exact delays.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def assemble(
 
 
 class _Assembly(Forces):
-    """Builder of one Model."""
+    """Builder of one Model from the forces and symbols of its mechanism."""
 
     def model(self, given: dict[str, sp.Symbol], roles: Mapping[str, Parameter]) -> Model:
         coordinates = tuple(
@@ -182,7 +182,7 @@ class _Assembly(Forces):
         return tuple(variables), tuple(rates)
 
     def _controller_error(self, senses: Shares) -> sp.Expr:
-        """Integrand of a controller; zero while the drive is released, and relative to its new position afterwards."""
+        """Integrand of a controller: its error; 0 while the drive is released, then relative to the new position."""
         found = row_of(senses, self.x)
         if not self.alternates:
             return found
@@ -212,7 +212,7 @@ class _Assembly(Forces):
         return found | {V_LP: sp.sympify(self.mechanism.velocity)} | none
 
     def _observables(self) -> dict[str, tuple[sp.Expr, str]]:
-        """Named results with units; stresses of a slider, forces of a machine's contacts."""
+        """Expression and SI unit of each named result; stresses for a slider, forces for contacts of a machine."""
         tables: list[tuple[str, Observables]] = []
         for one in self.mechanism.coordinates:
             if one.inner:
@@ -245,7 +245,7 @@ class _Assembly(Forces):
         return seen
 
     def _law_observables(self, site: SymbolicContact) -> list[tuple[str, Observables, Observables]]:
-        """Observables of both laws of a contact: for each law its description, memory variables and observables."""
+        """Observables of the friction law and the contact law: each with description, memory and observables."""
         port, own = site.port, f"{site.port.name}." if site.port.name else ""
         stated = port.friction.observables(site.velocity, site.sigma, site.memory, site.tau)
         found: list[tuple[str, Observables, Observables]] = []
@@ -261,7 +261,7 @@ class _Assembly(Forces):
         return found
 
     def _link_force(self, element: Element) -> Observables:
-        """Force of a link with which its first end pulls the second (N or N m)."""
+        """Observable of a link: the force (N) or torque (N m) with which its first end pulls the second."""
         resting = self._simplified(self.statics.tension(element))
         twisted = all(one.unit == "rad" for one in self.mechanism.coordinates if one.name in element.acts)
         force = -resting - self._tension(element, self.x, self.moving)
@@ -283,9 +283,9 @@ RESERVED_NAMES = {
 }  # fmt: skip
 """Names that results of every rig use, with their meanings; laws cannot use them."""
 _AHEAD_OF = {sp.Integer(0): "beyond its place in steady sliding", sp.Integer(1): "ahead of the load point"}
-"""Words for what a displacement is measured from, by the share of the speed of the load point."""
+"""Phrases for the reference of a displacement, by the ratio of steady speed to the speed of the load point."""
 AHEAD_OF_STEADY = "ahead of its steady motion with the load point"
-EVENTS = "event_"  # prefix of the columns of events in files of runs
+EVENTS = "event_"  # prefix of the columns that mark events in the files of simulated runs
 
 Observables = Mapping[str, tuple[sp.Expr, str]]
 

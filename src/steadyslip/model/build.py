@@ -1,4 +1,4 @@
-"""Model of a rig: its numbers are replaced by symbols, and the mechanism is assembled; cached by structure."""
+"""Build the Model of a rig: numbers become symbols, the mechanism is assembled; rigs of one structure share a Model."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class _Structure:
 
 @lru_cache(maxsize=128)
 def _build_cached(structure: _Structure, order: int) -> Model:
-    """Model of a structure; with an `order` that for motion, if it has delays."""
+    """Build the Model of a rig structure; `order` > 0 replaces each delay by that many variables, for motion."""
     rig = structure.rig
     symbols, known = _parameter_symbols(rig, structure.present)
     given = {name: symbol for name, symbol in symbols.items() if symbol.is_Symbol}
@@ -120,7 +120,7 @@ def _build_cached(structure: _Structure, order: int) -> Model:
 
 
 def _check_pulls(model: Model, mechanism: Mechanism) -> None:
-    """Raise NotAvailable if the normal stress at a structure follows the pull of a spring."""
+    """Raise NotAvailable if the normal stress at a contact of a structure depends on the pull of a spring."""
     inner = {name for part in mechanism.structures for name in part.coordinates}
     for contact, port in zip(model.contacts, mechanism.contacts, strict=True):
         body = next(name for name in port.slip if name != LOAD_POINT)
@@ -129,7 +129,7 @@ def _check_pulls(model: Model, mechanism: Mechanism) -> None:
 
 
 def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any], dict[sp.Symbol, str]]:
-    """Symbols of the given parameters by dotted name, and their letters; structural zeros stay the number zero."""
+    """Symbols of the rig's parameters by dotted name, and display letters; parameters whose 0 removes a term stay 0."""
     symbols: dict[str, Any] = {}
     every, numbers = parameters(rig), in_matrices(rig)
     declared = Counter(address.role.letter for address in every.values())
@@ -153,7 +153,7 @@ def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any
 
 
 def in_matrices(rig: Rig) -> tuple[str, ...]:
-    """Parameters of structures that stay numbers of the Model: directions of points, spin, damping of modes."""
+    """Names of structure parameters that enter the Model as numbers: point angles, spin, modal damping."""
     found = []
     for body, one in rig.bodies.items():
         if one.is_structure:
@@ -164,11 +164,12 @@ def in_matrices(rig: Rig) -> tuple[str, ...]:
 
 
 def _plain_letter(name: str, address: Address) -> str:
+    """Declared letter of a parameter, or the last part of its dotted name."""
     return address.role.letter or name.rpartition(".")[2]
 
 
 def _owned(name: str, address: Address) -> str:
-    """Letter of a parameter after what tells it from others with the same: its member of a machine, a number."""
+    """Letter of a parameter, prefixed by the machine member and index that make it unique: `bodies.pad.m`."""
     before = name.split(".")[:-1]
     if before[0] in MEMBERS:
         before = [*before[:2], *(one for one in before[2:] if one.isdigit())]

@@ -1,14 +1,14 @@
 """Dead times in motion: a delayed signal as the end of a transport equation, in Legendre polynomials.
 
-What a signal u was during the last τ seconds, w(θ, t) = u(t − θτ), obeys τ w_t + w_θ = 0 with w(0) = u, and the late
-signal is w(1). Polynomials of degree n − 1 in θ, tested with themselves, with the flux taken from upstream (Galerkin;
-Breda, Diekmann, Gyllenberg, Scarabel and Vermiglio 2016 for collocation) turn that into n linear equations. Their
-transfer function is the Padé approximant [n−1/n] of exp(−sτ) (Lesaint and Raviart 1974): as good as exact for all that
-swings fewer than about n/6 times in τ, strictly proper, so that nothing acts before its time by a jump, and stable.
+The history of a signal u during the last τ seconds, w(θ, t) = u(t − θτ), obeys τ w_t + w_θ = 0 with w(0) = u, and the
+late signal is w(1). A Galerkin method with upwind flux and polynomials of degree n − 1 in θ (compare
+Breda, Diekmann, Gyllenberg, Scarabel and Vermiglio 2016 for collocation) turns that into n linear equations. Their
+transfer function is the Padé approximant [n−1/n] of exp(−sτ) (Lesaint and Raviart 1974): accurate for signals with
+fewer than about n/6 periods in τ, stable, and strictly proper, so that a jump of u does not act at once.
 
-A Model for motion has these n variables for every late signal in place of the symbols `Model.late` of linear stability,
-which takes the delay exactly. The variables are those of the real Schur form, an orthogonal change of the orthonormal
-polynomials: half of the coefficients vanish, and none is larger than before.
+A Model for motion has these n variables for every late signal; a Model for linear stability has the symbols
+`Model.late` and exact delays. The n equations are brought to real Schur form by an orthogonal transformation: half of
+the coefficients vanish, and the others do not grow.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.variables import Variable
 
 ORDERS = (6, 10, 16, 24, 36)
-"""Variables of a late signal that are chosen from: e^(−iωτ) to 1e-6 up to ωτ = 2.8, 7.4, 15, 26, 44."""
-USUAL_ORDER = ORDERS[1]
+"""Possible numbers of variables of a late signal; the error of e^(−iωτ) is 1e-6 at ωτ = 2.8, 7.4, 15, 26, 44."""
+USUAL_ORDER = ORDERS[1]  # default number of variables of a late signal
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Transport:
 
 @cache
 def transport(order: int) -> Transport:
-    """Transport over the unit interval by orthonormal Legendre polynomials, in real Schur form."""
+    """Equations of transport over the unit interval by `order` orthonormal Legendre polynomials, in real Schur form."""
     from scipy.linalg import schur  # slow to import
 
     k = np.arange(order)
@@ -47,7 +47,7 @@ def transport(order: int) -> Transport:
     ahead = k[None, :] >= k[:, None]
     matrix = -np.outer(size, size) * np.where(ahead, 1.0, (-1.0) ** (k[:, None] - k[None, :]))
     upper, turned = schur(matrix, output="real")
-    turned = turned * np.where(turned.T @ (size * (-1.0) ** k) < 0, -1.0, 1.0)  # signs that LAPACK leaves open
+    turned = turned * np.where(turned.T @ (size * (-1.0) ** k) < 0, -1.0, 1.0)  # LAPACK's signs are arbitrary
     upper = np.triu(turned.T @ matrix @ turned, -1) * (np.abs(np.tril(upper, -1)) + np.triu(np.ones_like(upper)) > 0)
     return Transport(upper, turned.T @ (size * (-1.0) ** k), turned.T @ size)
 
@@ -61,9 +61,9 @@ class LateSignal:
     signal, steady : sympy.Expr
         The signal now, and its value in steady sliding.
     delay : sympy.Expr
-        s.
+        Delay in s.
     variables : tuple of Variable
-        Of kind ``past``; zero after steady sliding for the delay.
+        Variables of kind ``past``; zero once steady sliding has lasted for one delay.
     """
 
     signal: sp.Expr
@@ -77,13 +77,13 @@ class LateSignal:
 
     @property
     def late(self) -> sp.Expr:
-        """The signal a delay ago."""
+        """Expression of the signal one delay ago."""
         end = transport(len(self.variables)).outflow
         return self.steady + sp.Add(*(float(c) * s for c, s in zip(end, self.symbols, strict=True)))
 
     @property
     def settled(self) -> dict[sp.Symbol, sp.Expr]:
-        """Values of the variables after a signal that did not change for the delay."""
+        """Values of the variables once the signal has been constant for one delay."""
         equations = transport(len(self.variables))
         shares = -np.linalg.solve(equations.matrix, equations.inflow)
         change = self.signal - self.steady
@@ -103,7 +103,7 @@ class LateSignal:
 def late_signal(
     place: int, order: int, signal: sp.Expr, steady: sp.Expr, delay: sp.Expr, unit: str
 ) -> LateSignal:  # fmt: skip
-    """Late signal number `place` of a Model, by `order` polynomials."""
+    """Make the late signal with index `place` of a Model, represented by `order` polynomials."""
     symbols = [inner_symbol(f"past_{place:03d}_{k:03d}", real=True) for k in range(order)]
     variables = (
         Variable(f"late {place + 1}.{k + 1}", s, unit, "part of what acts late", "past") for k, s in enumerate(symbols)

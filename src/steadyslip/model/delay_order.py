@@ -1,4 +1,4 @@
-"""Number of parts of late signals that a rig's motion needs, by its fastest vibration."""
+"""Number of variables that represent each delayed signal in a rig's motion, from its fastest vibration."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 
 HARMONICS = 4.0
-"""Delayed signals are accurate up to this multiple of the rig's fastest vibration: in a slip event velocity changes
-faster than in a vibration. Each motion is checked by `finer_order`."""
+"""Delayed signals are accurate up to this multiple of the rig's highest frequency, as velocity changes faster in a slip
+event than in a vibration. Each motion is checked with `finer_order`."""
 LATE_ACCURACY = 1e-6
-"""Error allowed in the delayed signal at that frequency, relative to the signal."""
+"""Error allowed in a delayed signal at `HARMONICS` times the highest frequency, relative to the signal."""
 _LEAST_WITHOUT_MASS = 1
 """Least index in `ORDERS` for rigs without mass, in which nothing limits how fast velocity changes in a slip event."""
 
 
 def order_for(point: OperatingPoint) -> int:
-    """Number of variables of each late signal that serves all rigs of a point."""
+    """Number of variables of each late signal, large enough for all rigs of a point."""
     with np.errstate(all="ignore"):
         found = [np.asarray(one, dtype=float) for one in point.evaluate(_frequencies(point.model))]
     squares, delays = found[: -len(point.model.delays)], found[-len(point.model.delays) :]
@@ -35,7 +35,7 @@ def order_for(point: OperatingPoint) -> int:
 
 
 def finer_order(order: int) -> int:
-    """Next larger number of variables, by which a motion is checked."""
+    """Next larger number of variables of a late signal, with which a motion is checked."""
     return ORDERS[ORDERS.index(order) + 1]
 
 
@@ -52,9 +52,9 @@ def pade_error(order: int, turn: float) -> float:
 
 @cached
 def _frequencies(model: Model) -> ArrayFunction:
-    """Array function of bounds of the squared angular frequencies of bodies, (rad/s)², then of the delays, s.
+    """Array function of upper bounds of the squared angular frequencies of bodies (rad/s)², followed by the delays (s).
 
-    By Gershgorin: the sum of all stiffnesses in the balance of a body, late ones too, over its inertia.
+    Gershgorin's bound: the sum of all stiffnesses in the balance of a body, delayed ones included, over its inertia.
     """
     places = [one.displacement for one in model.coordinates]
     places += [late for late, (base, _) in model.late.items() if base in places]

@@ -124,7 +124,7 @@ def _in_ring(entry: Polynomial, ring: Any) -> Any:
 
 
 def machine_determinant(model: Model, rows: Rows, tensions: Sequence[sp.Symbol] = ()) -> Polynomial:
-    """Determinant of the characteristic matrix of a machine, whose rows of `tensions` are those of links' forces.
+    """Determinant of the characteristic matrix `rows` of a machine; the forces `tensions` of links are unknowns.
 
     Raises
     ------
@@ -185,10 +185,10 @@ class _Block:
 
 
 def without_cancellation(matrix: list[list[Polynomial]]) -> Polynomial | None:
-    """Determinant of a small matrix expanded in its symbols, if terms cancel in it; None if none do.
+    """Determinant of a small matrix expanded in its symbols if terms cancel in it; None if no terms cancel.
 
-    They do where friction depends on the rate of its own memory, as that of bristles with damping does: the products of
-    that rate's slopes cancel, which rounding would not let them where they are many orders above the rest.
+    Terms cancel where friction depends on the rate of its own memory variable, as for bristles with damping. These
+    products of slopes may be many orders larger than the rest, so that in floating point they would not cancel.
     """
     placeholders = Placeholders()
     entries = [[{powers: placeholders.polynomial(e) for powers, e in entry.items()} for entry in row] for row in matrix]
@@ -201,12 +201,12 @@ def without_cancellation(matrix: list[list[Polynomial]]) -> Polynomial | None:
 
 
 def _sum_of_sizes(entry: Polynomial) -> int:
-    """Sum of the sizes of all whole coefficients of an entry."""
+    """Sum of the absolute values of the integer coefficients of an entry."""
     return sum(int(sum(map(abs, sp.Poly(e, *e.free_symbols or [sp.Dummy()]).coeffs()))) for e in entry.values())
 
 
 def _permanent(matrix: list[list[int]]) -> int:
-    """What a determinant is if no sign changes."""
+    """Permanent of a square matrix: the determinant's expansion with all signs positive."""
     if not matrix:
         return 1
     first, *rest = matrix
@@ -265,7 +265,7 @@ def sum_of_terms(terms: Terms, factors: list[sp.Expr]) -> sp.Expr:
 def _nested(terms: Terms, factors: list[sp.Expr], first: int = 0) -> sp.Expr:
     """Expression of a polynomial in Horner-like form, each factor taken out of the terms that contain it.
 
-    This shortens polynomials of thousands of terms; nothing needs to cancel any more, as `terms` are distinct.
+    This shortens polynomials of thousands of terms; `terms` are distinct, so none of them cancel.
     """
     if len(terms) == 1:
         powers, number = terms[0]

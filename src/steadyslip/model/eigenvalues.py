@@ -26,8 +26,8 @@ from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_rows, is_written_out, linearise, sets_of_delays
 from steadyslip.model.point import OperatingPoint, stacked
 
-ZERO_TOLERANCE = 1e-11  # relative to the largest number; cancelled sums of some numbers leave less; chosen by trial
-LEAST_PIVOT = 1e-6  # relative to the largest; a smaller pivot would lose six of 16 digits; chosen by trial
+ZERO_TOLERANCE = 1e-11  # relative to the largest entry; sums that cancel leave a smaller rounding error; by trial
+LEAST_PIVOT = 1e-6  # relative to the largest pivot; a smaller one would lose six of 16 digits; by trial
 UNDETERMINED = "ill-posed: the balances of forces do not determine the motion"
 
 
@@ -52,8 +52,8 @@ class Matrices:
 class Descriptor:
     """x' = A x + B u + C z, y = D x + E u + F z, 0 = P x + Q u + R z, in this order.
 
-    x are the states, u the inputs, y the outputs, z the algebraic unknowns. `first` marks the x that index reduction
-    preferably removes.
+    x are the states, u the inputs, y the outputs, z the algebraic unknowns. `first` is True for the states that index
+    reduction removes first if it can.
     """
 
     states: tuple[str, ...]
@@ -163,9 +163,9 @@ class Descriptor:
 def block_function(
     model: Model, outputs: tuple[str, ...], inputs: tuple[str, ...], at_once: tuple[sp.Expr, ...] = ()
 ) -> tuple[ArrayFunction, list[tuple[int, int]]]:
-    """Array function of the entries of a `Descriptor`'s nine blocks, and the shapes of the blocks.
+    """Array function of the entries of a `Descriptor`'s nine blocks, and the shape of each block.
 
-    Terms with a delay in `at_once` act without delay, terms with another delay are left out.
+    Delayed terms whose delay is in `at_once` act without delay; other delayed terms are left out.
     """
     linear = linearise(model)
     variables = [item.symbol for item in model.variables]
@@ -192,7 +192,7 @@ def block_function(
 def blocks_of(
     point: OperatingPoint, outputs: tuple[str, ...], inputs: tuple[str, ...], at_once: tuple[sp.Expr, ...] = ()
 ) -> list[Array]:
-    """Values of the nine blocks of a `Descriptor` at a point, each (..., rows, columns)."""
+    """Values of the nine blocks of a `Descriptor` at a point, each of shape (..., rows, columns)."""
     function, shapes = block_function(point.model, outputs, inputs, at_once)
     with np.errstate(all="ignore"):
         found = stacked(point.evaluate(function), point)
@@ -211,8 +211,8 @@ def descriptor(model: Model, inputs: tuple[str, ...], blocks: Sequence[Array]) -
 Delays = tuple[sp.Expr, ...]
 
 MOVED = 1e-6
-"""Share of an eigenvalue by which rounding may move it: as much as a check of eigenvalues allows."""
-_ROUNDING = 4 * np.finfo(float).eps  # relative, of what a few operations make of the rig's numbers
+"""Relative change of an eigenvalue by rounding that is accepted: the tolerance of the checks of eigenvalues."""
+_ROUNDING = 4 * np.finfo(float).eps  # relative error of matrix entries, which a few operations make of parameters
 
 
 @cached
@@ -235,10 +235,10 @@ def coefficients_from_eigenvalues(point: OperatingPoint) -> list[Array]:
 
 @cached
 def eigenvalues_of(point: OperatingPoint, late: Delays = ()) -> NDArray[np.complex128]:
-    """Eigenvalues (1/s), (..., n), by falling real part.
+    """Eigenvalues (1/s), shape (..., n), in order of decreasing real part.
 
-    Terms with the delays `late` act without delay, other delayed terms are left out. NaN without steady sliding, and as
-    padding if massless bodies leave fewer states.
+    Terms with the delays `late` act without delay; other delayed terms are left out. NaN where there is no steady
+    sliding, and as padding where massless bodies leave fewer states.
     """
     with np.errstate(all="ignore"):
         found = _eigenvalues(point, late)[0]
@@ -248,11 +248,11 @@ def eigenvalues_of(point: OperatingPoint, late: Delays = ()) -> NDArray[np.compl
 
 @cached
 def digits_lost(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where rounding of the state matrix moves an eigenvalue by more than `MOVED` of it, (...).
+    """True for each rig where rounding of the state matrix A moves an eigenvalue by more than `MOVED` times its size.
 
-    An entry of that matrix adds the stiffnesses of several links, so that rounding of the stiffest may hide others. To
-    first order an eigenvalue moves by |w| |A| |v| times the relative rounding of A; w and v are its eigenvectors, with
-    w v = 1. False where the characteristic polynomial is written out, or there are delays.
+    An entry of A adds the stiffnesses of several links, so that rounding of the stiffest may hide others. To first
+    order an eigenvalue moves by |w| |A| |v| times the relative rounding of A, with left and right eigenvectors w and v,
+    w v = 1. False if the characteristic polynomial is known in symbols, or if there are delays.
     """
     if point.model.delays or is_written_out(point.model):
         return np.zeros(point.shape, dtype=bool)
@@ -282,7 +282,7 @@ def _polynomial(point: OperatingPoint, late: Delays) -> Array:
 
 @cached
 def _eigenvalues(point: OperatingPoint, late: Delays) -> tuple[NDArray[np.complex128], Array]:
-    """Eigenvalues of the state matrix in any order, and by how much a relative change of its entries moves them."""
+    """Eigenvalues of the state matrix (1/s), unordered, and the change of each per relative change of all entries."""
     blocks = blocks_of(point, (), (), late)
     rate_x, rate_z, balance_x, balance_z = (blocks[i] for i in (0, 2, 6, 8))  # in the order of `Descriptor`
     good = np.all([np.all(np.isfinite(one), axis=(-2, -1)) for one in (rate_x, rate_z, balance_x, balance_z)], axis=0)
@@ -296,7 +296,7 @@ def _eigenvalues(point: OperatingPoint, late: Delays) -> tuple[NDArray[np.comple
         return np.where(good[..., None], found, np.nan), sizes
     flat = [block.reshape(good.size, *block.shape[-2:]) for block in blocks]
     rows = [_single_rig(point.model, [block[i] for block in flat]) if ok else None for i, ok in enumerate(good.ravel())]
-    width = max((len(row[0]) for row in rows if row is not None), default=1)  # one NaN where none is known
+    width = max((len(row[0]) for row in rows if row is not None), default=1)  # at least one column, of NaN
     table, moved = np.full((len(rows), width), np.nan, dtype=complex), np.full((len(rows), width), np.nan)
     for i, row in enumerate(rows):
         if row is not None and len(row[0]) == width:
@@ -305,16 +305,16 @@ def _eigenvalues(point: OperatingPoint, late: Delays) -> tuple[NDArray[np.comple
 
 
 def _of_matrix(a: Array) -> tuple[NDArray[np.complex128], Array]:
-    """Eigenvalues of matrices (..., n, n), and by how much a relative change of all entries moves each, (..., n)."""
+    """Eigenvalues of matrices (..., n, n), and the change of each per relative change of all entries, both (..., n)."""
     found, right = np.linalg.eig(a)
-    singular = np.linalg.det(right) == 0  # of an eigenvalue that is there twice with one eigenvector
+    singular = np.linalg.det(right) == 0  # a multiple eigenvalue with fewer eigenvectors
     left = np.linalg.inv(np.where(singular[..., None, None], np.eye(a.shape[-1]), right))
     sizes = np.einsum("...ij,...jk,...ki->...i", np.abs(left), np.abs(a), np.abs(right))
     return found.astype(complex), np.where(singular[..., None], 0.0, sizes)
 
 
 def _single_rig(model: Model, blocks: list[Array]) -> tuple[NDArray[np.complex128], Array] | None:
-    """Eigenvalues of a single rig and how they move; None if the balances do not determine a finite motion."""
+    """Result of `_of_matrix` for a single rig; None if the balances do not determine a finite motion."""
     try:
         a = descriptor(model, (), blocks).solved((), ()).a
     except NotAvailable:

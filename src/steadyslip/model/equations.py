@@ -40,7 +40,7 @@ class Coordinate:
     push : sympy.Symbol
         Disturbance acting on the coordinate: a force or torque, on a slider a stress.
     inner : bool
-        True for a coordinate of a structure, which is no result: its points are.
+        True for an internal coordinate of a structure; results have the motion of the structure's points instead.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Coordinate:
 
     @property
     def words(self) -> str:
-        """Name of the body, and that the motion is away from the surface if it is: "pad away from the surface"."""
+        """Name of the body, followed by "away from the surface" for a coordinate normal to it."""
         return self.name.replace(NORMAL, " away from the surface")
 
 
@@ -146,16 +146,16 @@ class LettingGo:
     free : sympy.Symbol
         Input: 1 while the force is imposed, else 0.
     held : sympy.Symbol
-        Variable: force of the drive minus the force that its motion since the start alone would cause; while it is
-        released, the force minus that of steady sliding and minus ``loading``. It changes at release and at the end of
-        it, so that the force is continuous.
+        Variable: force of the drive minus the force that its motion since the start alone would cause; while the drive
+        is released, the force minus its steady value and minus ``loading``. It jumps at the beginning and end of a
+        release so that the force of the drive is continuous.
     force, driven, steady : sympy.Expr
         Force of the drive minus that of steady sliding; the part caused by its motion; the force in steady sliding.
         Stresses for a slider.
     stiffness : sympy.Expr
         Stiffness of the elements that carry the force of the drive.
     ahead, speed : sympy.Expr
-        Displacement of the load point ahead of its steady motion since the start, and the rate of that.
+        Displacement of the load point ahead of its steady motion since the start, and its time derivative.
     loading_rate : sympy.Symbol
         Time derivative of ``loading``.
     """
@@ -201,14 +201,14 @@ class Carried:
 class Model(HasCache, Displayed):
     """Equations of a rig.
 
-    The variables y obey y' = `rates`. The `balance` = 0 of each contact determines its friction stress; the balance of
-    forces of each coordinate determines its acceleration, or without inertia its velocity. A slider has one equation
-    for both. Slip rates and the stresses T, τ, σ are given by `definitions`, in this order, as functions of variables,
-    unknowns and inputs.
+    The variables y obey y' = `rates`. The equation `balance` = 0 of each contact determines its friction stress; the
+    balance of forces of each coordinate determines its acceleration, or without inertia its velocity. A slider has one
+    equation for friction and motion. Slip rates and the stresses T, τ, σ are given by `definitions`, in this order, as
+    functions of variables, unknowns and inputs.
 
-    Derived expressions and functions are cached with the Model (`steadyslip.core.caching`): its methods here, and in
-    neighbouring modules `linearise`, `reduce_model`, `system` (Taylor terms) and `steady_equation`. Numbers come with
-    an `operating_point`.
+    Derived expressions and functions are cached with the Model (`steadyslip.core.caching`), those of neighbouring
+    modules included: `linearise`, `reduce_model`, `system` (Taylor terms), `steady_equation`. A Model has no numbers;
+    an `operating_point` adds them.
 
     Attributes
     ----------
@@ -241,14 +241,14 @@ class Model(HasCache, Displayed):
     late : dict of sympy.Symbol to (sympy.Symbol, sympy.Expr)
         Symbols of delayed displacements, velocities or integrals: the undelayed symbol, and the delay (s).
     late_signals : tuple of LateSignal
-        Of a Model for motion; see `steadyslip.model.dead_time`.
+        Delayed signals of a Model for motion; see `steadyslip.model.dead_time`.
     for_motion : callable or None
         With delays: function that builds the Model for motion, without delays, from the number of variables of each
         late signal (`steadyslip.model.dead_time`). It has the same parameters.
     letting_go : LettingGo or None
-        For a drive that is alternately moved and released.
+        Expressions for a drive that is alternately moved and released; None for other drives.
     carried : Carried or None
-        Equations of link forces in steady sliding, if their solution would be too long as formulas.
+        Equations of link forces in steady sliding, if the symbolic solution would be too long; else None.
     points : mapping of str to Shares
         Rows of the points of structures by the names of coordinates; see `Mechanism.points`.
     """
@@ -293,7 +293,7 @@ class Model(HasCache, Displayed):
 
     @property
     def is_single(self) -> bool:
-        """True for one block with one contact (theory 1)."""
+        """True for one block on one contact, described by a single equation."""
         return len(self.contacts) == len(self.coordinates) == 1 and self.coordinates[0].balance is None
 
     @property
@@ -343,7 +343,7 @@ class Model(HasCache, Displayed):
 
     @property
     def late_order(self) -> int:
-        """Number of variables of each late signal, in a Model for motion; 0 without."""
+        """Number of variables of each late signal in a Model for motion; 0 if there is no late signal."""
         return len(self.late_signals[0].variables) if self.late_signals else 0
 
     @property

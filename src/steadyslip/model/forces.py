@@ -48,23 +48,23 @@ class SymbolicContact:
     def tau_ss(self) -> sp.Expr:
         """Friction stress in steady sliding."""
         given = self.speed, self.sigma_ss
-        all_of_law(self.port.friction, "steady_memory", len(self.memory), *given)  # on which the strength may rest
+        all_of_law(self.port.friction, "steady_memory", len(self.memory), *given)  # checked first: strength may use it
         return of_law(self.port.friction, "steady_strength", *given)
 
 
 def of_law(law: object, method: str, *arguments: Any) -> sp.Expr:
-    """Expression that a method of a friction or contact law gives, if the Model can use it.
+    """Expression returned by a method of a friction or contact law, checked.
 
     Raises
     ------
     NotAvailable
-        If it gives no expression, or one that cannot be computed; see `supported`.
+        If the method returns no expression, or one that cannot be computed; see `supported`.
     """
     return _usable(law, method, _answer(law, method, arguments))
 
 
 def all_of_law(law: object, method: str, count: int, *arguments: Any) -> tuple[sp.Expr, ...]:
-    """Expressions that a method gives for `count` memory variables; raises as `of_law` does."""
+    """Expressions returned by a method of a law for its `count` memory variables, checked as in `of_law`."""
     found = _answer(law, method, arguments)
     if not isinstance(found, (tuple, list)) or len(found) != count:
         given = len(found) if isinstance(found, (tuple, list)) else f"a bare {type(found).__name__}"
@@ -97,9 +97,9 @@ class Forces:
     Attributes
     ----------
     imposed, alternates : bool
-        The force of the drive is imposed during the whole or a part of the run; it alternates with motion.
+        `imposed`: the force of the drive is imposed for all or part of the run; `alternates`: for part of it.
     single, bare : bool
-        One block on one contact (a slider); contacts have no names.
+        `single`: one block on one contact (a slider); `bare`: contacts have no names.
     x, v, a, push : dict of str to sympy.Symbol
         Displacement, velocity, acceleration and disturbance of each coordinate.
     moving, speeds : dict of str
@@ -156,6 +156,7 @@ class Forces:
     # -- symbols of contacts
 
     def _drive_symbol(self, what: str) -> sp.Symbol:
+        """Symbol of a quantity of the drive, such as ``loading``."""
         return self.letters.symbol(f"drive_{what}", f"drive.{what}", real=True)
 
     def _symbolic_contact(self, index: int, port: ContactPort) -> SymbolicContact:
@@ -249,7 +250,7 @@ class Forces:
         ]  # fmt: skip
 
     def _pull(self, name: str, elements: list[Element], integral: bool = True) -> sp.Expr:
-        """Force of elements, and of integral action, on a coordinate, without that of the steady displacements."""
+        """Force on a coordinate by elements and integral action, minus the force due to steady displacements."""
         total, acting = sp.Integer(0), [one for one in elements if name in one.acts]
         if self.imposed:
             drive_elements = [one for one in acting if one in self.drive_elements]
@@ -266,7 +267,7 @@ class Forces:
         return total - self._integrated(name, self._delayed(delay, {"": INTEGRAL})[""]) if integral else total
 
     def _late_pull(self, name: str, elements: list[Element], integral: bool) -> sp.Expr:
-        """Late force of elements, and of integral action, on a coordinate; equal dead times make one signal."""
+        """Delayed force on a coordinate by elements and integral action; forces of equal delay make one signal."""
         parts: dict[tuple[Any, Any], list[tuple[sp.Expr, sp.Expr]]] = {}
         for one in elements:
             both = self._tension(one, self.x, self.moving), self._tension(one, {}, self.speeds)
@@ -359,11 +360,11 @@ class Forces:
         return self._at_drive() * pull / self._force_area()
 
     def _force_area(self) -> Any:
-        """Area that divides the force of the drive: that of the contact for a slider, 1 for a machine."""
+        """Divisor of the force of the drive: contact area for a slider (gives a stress), 1 for a machine."""
         return self.sites[0].port.area if self.bare else 1
 
     def _delayed(self, delay: Any, now: Mapping[str, sp.Symbol]) -> Mapping[str, sp.Symbol]:
-        """Symbols of variables a `delay` (s) ago; the load point's velocity is constant and stays."""
+        """Symbols of the variables one `delay` (s) ago; the load point's velocity is constant and not delayed."""
         if delay == 0:
             return now
         return {n: s if s is V_LP else self._delayed_symbol(s, sp.sympify(delay)) for n, s in now.items()}
@@ -379,12 +380,12 @@ class Forces:
         return late
 
     def _steady_pull(self, name: str, elements: list[Element], integral: bool) -> sp.Expr:
-        """Force of elements, and of integral action, in steady sliding, without dashpots, which `_pull` includes."""
+        """Force on a coordinate in steady sliding by springs and integral action; `_pull` includes the dashpots."""
         total = sp.Add(*(-one.acts.get(name, 0) * self.statics.tension(one) for one in elements))
         return self._simplified(total - self._integrated(name, self.statics.integral) if integral else total)
 
     def _integrated(self, name: str, integral: sp.Expr) -> sp.Expr:
-        """Force of integral action on a coordinate; the steady part only if the drive's force is imposed."""
+        """Force of integral action on a coordinate; only its steady part if the drive's force is imposed."""
         acting = self.mechanism.integral
         if acting is None or (self.imposed and integral is INTEGRAL):
             return sp.Integer(0)
@@ -393,7 +394,7 @@ class Forces:
     # -- definitions
 
     def _define(self) -> None:
-        """Set the definitions: slip rates, then T, τ and σ of the contacts."""
+        """Fill `definitions` with slip rates, then T, τ and σ of the contacts."""
         for site in self.sites:
             if site.velocity not in self.v.values():
                 self.definitions[site.velocity] = row_of(site.port.slip, self.moving)
@@ -410,7 +411,7 @@ class Forces:
         self.definitions |= {site.sigma: law for site, law in zip(self.sites, self.normal, strict=True)}
 
     def _contact_motion(self, site: SymbolicContact) -> ContactInputs:
-        """Motion passed to a contact law; also defines T, the pull at the body per area of the contact."""
+        """Arguments of the contact law's methods; also defines T, the pull on the body per contact area."""
         port, body = site.port, next(name for name in site.port.slip if name != LOAD_POINT)
         belt = LOAD_POINT in port.slip  # the body slides on the moving load point and is held by links to the ground
         pulling = self.mechanism.pulling(port)
@@ -431,7 +432,7 @@ class Forces:
         return self._motion(site, steady + moving, stiffness / (lever * port.slip[body]), apart, distance)
 
     def _steady_slider_pull(self) -> sp.Expr:
-        """Pull at a slider's block in steady sliding per area: friction plus the force of grounded elements."""
+        """Pull on a slider's block in steady sliding per area (Pa): friction plus the force of grounded elements."""
         (site,), (body,) = self.sites, self.mechanism.coordinates
         held = sp.Add(*(self._tension(one, {}, self.speeds) for one in self._grounded()))
         return site.tau_ss + (held - body.force) / site.port.area
@@ -447,7 +448,7 @@ class Forces:
         return found + self.push[body.name] / site.port.area
 
     def _balance(self, name: str, inertia: Any) -> sp.Expr | None:
-        """Inertia minus forces of a coordinate, both without their steady values; None for a slider."""
+        """Balance of a coordinate: inertia minus the forces' changes from steady sliding; None for a slider."""
         if self.single:
             return None
         total = inertia * self.a[name] - self._pull(name, list(self.mechanism.elements)) - self.push[name]
@@ -462,7 +463,7 @@ class Forces:
     def _excess_force(self, element: Element) -> sp.Expr:
         """Force in an element of a drive with imposed force, minus that of steady sliding.
 
-        If several elements are in parallel (a spring and a controller), the first one has the imposed part.
+        Of elements in parallel (a spring and a controller), the first is assigned the imposed force.
         """
         if not self.alternates:
             return -self.loading / element.acts[LOAD_POINT]

@@ -1,7 +1,7 @@
 """Choice of the velocity variables of a Model, and all other velocities as functions of them.
 
-Each contact has a preferred velocity variable w, such as ln v, in which its friction law is smooth. It replaces the
-velocity of one coordinate that contributes to the slip. If all of these are already replaced (a body on two
+Each contact has a preferred velocity variable w, such as ln v, in which its friction law is smooth; w replaces the
+velocity of one coordinate that contributes to the slip. If all such coordinates are already replaced (a body on two
 contacts), the slip rate is a function of the other variables.
 """
 
@@ -19,7 +19,7 @@ from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.equations import Contact, Coordinate, Model
 
 W = inner_symbol("w", real=True)
-_FIRST = ("logarithm", "asinh", "linear")
+_FIRST = ("logarithm", "asinh", "linear")  # order in which contacts choose a coordinate
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Kinematics:
     coordinates : tuple of Coordinate or None
         The coordinate whose velocity the contact's variable replaces; None if there is none.
     speeds : dict of sympy.Symbol to sympy.Expr
-        Dependent velocities of coordinates and contacts, as functions of the independent ones and of the load point's.
+        Dependent velocities of coordinates and contacts, as functions of independent velocities and the load point's.
     """
 
     variables: tuple[VelocityVariable | None, ...]
@@ -136,7 +136,7 @@ def _singular_at_rest(expression: sp.Expr, v: sp.Symbol) -> bool:
 
 
 def in_variables(expression: sp.Expr, found: Kinematics, model: Model) -> sp.Expr:
-    """Express in the velocity variables, in which ln v and the argument of the regularised law become linear."""
+    """Rewrite an expression in the velocity variables, in which ln v and the regularised law's argument are linear."""
     expression = expression.xreplace(dict(found.speeds))
     for variable, contact in zip(found.variables, model.contacts, strict=True):
         if variable is not None:
@@ -177,7 +177,7 @@ def _is_product_with_sum(expression: sp.Expr, w: sp.Symbol) -> bool:
 
 
 def solve_linear(residual: sp.Expr, unknown: sp.Symbol) -> sp.Expr | None:
-    """Solve a residual for an unknown; None if it is not linear in it or does not depend on it."""
+    """Root of a residual that is linear in an unknown; None if it is nonlinear or does not contain the unknown."""
     slope = derivative(residual, unknown)
     if slope.has(unknown) or slope == 0:
         return None
@@ -204,7 +204,7 @@ def solve_sequentially(
 
 
 def solve_jointly(equations: Iterable[sp.Expr], unknowns: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """Solve linear equations; each one for the first remaining unknown that it contains."""
+    """Solve linear equations one by one, each for the first remaining unknown that it contains."""
     found: dict[sp.Symbol, sp.Expr] = {}
     left = list(unknowns)
     for residual in equations:

@@ -9,9 +9,9 @@ import sympy as sp
 from steadyslip.model.equations import Contact, Coordinate, Model
 
 Meaning = tuple[str, str]
-"""SI unit and words."""
+"""SI unit, and description in words."""
 STATE_OF_LAW = "state of friction, as its law is described"
-"""Words for a state Θ that is no variable of the Model."""
+"""Description of a state Θ that appears in a law's text but is not a variable of the Model."""
 
 
 def legend(model: Model) -> dict[str, Meaning]:
@@ -43,7 +43,7 @@ def legend(model: Model) -> dict[str, Meaning]:
 
 
 def states_of_laws(model: Model) -> Iterator[sp.Eq]:
-    """Equations of the states Θ by which laws are described, where the variables Ψ of the Model are others.
+    """Equations of the states Θ used in the descriptions of laws, in terms of the Model's variables Ψ.
 
     >>> from steadyslip.model import build_model
     >>> from steadyslip.reproduce import paper_rig

@@ -46,9 +46,9 @@ class Linearisation:
     columns : tuple of sympy.Symbol
         Displacements, velocities, memory variables, integral, unknown friction stresses, kept stresses.
     rows : dict
-        For each column the gradient of its rate, with respect to columns, accelerations, delayed symbols and inputs;
-        for a velocity that of the balance of forces, for a friction stress that of its law minus friction, for a kept
-        stress that of its definition minus the stress.
+        For each column the gradient of its rate with respect to columns, accelerations, delayed symbols and inputs;
+        for a velocity the gradient of the balance of forces, for a friction stress of its law minus the stress, for a
+        kept stress of its definition minus the stress.
     outputs : dict
         Gradients of the observables.
     """
@@ -61,7 +61,7 @@ class Linearisation:
 
 @cached
 def linearise(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> Linearisation:
-    """Differentiate a Model at steady sliding; the intermediate stresses `kept` are not eliminated but unknowns."""
+    """Linearise a Model at steady sliding; the intermediate stresses `kept` stay unknowns, others are eliminated."""
     velocities = {one.displacement: one.velocity for one in model.coordinates}
     columns: dict[sp.Symbol, None] = {}
     for item in model.variables:  # velocities of massless bodies are columns too, though they are no variables
@@ -157,8 +157,8 @@ def _determinant(model: Model) -> Polynomial | None:
 def _loading_tensions(model: Model) -> tuple[sp.Symbol, ...]:
     """Forces of links (as stresses) on which the normal stress or the friction of a contact depends.
 
-    Such a force acts on a contact and on the bodies that the link joins. In a determinant that has it as an unknown,
-    the terms of these that cancel for every stiffness of the link cancel exactly.
+    Such a force acts on a contact and on the bodies that the link joins. If it is an unknown of the determinant, terms
+    of contact and bodies that cancel for every stiffness of the link cancel exactly.
     """
     springs = [contact.spring for contact in model.contacts if contact.spring in model.definitions]
     using = [e for symbol, e in model.definitions.items() if symbol not in springs]
@@ -173,7 +173,7 @@ def is_written_out(model: Model) -> bool:
 
 @cached
 def delays_of_terms(model: Model) -> list[tuple[sp.Expr, ...]]:
-    """Delays (s) that act in each term of the characteristic equation, none in the first; each acts once at most."""
+    """Delays (s) of each term of the characteristic equation, the term without delay first."""
     return [term.late for term in characteristic_terms(model)] if is_written_out(model) else sets_of_delays(model)
 
 
@@ -198,7 +198,7 @@ def _single_determinant(model: Model) -> Polynomial:
 
 @cached
 def characteristic_rows(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> dict[sp.Symbol, list[Polynomial]]:
-    """Characteristic matrix; each entry has coefficients by exponents of s and of exp(−s delay) of each delay.
+    """Rows of the characteristic matrix; each entry is a dict of coefficients by exponents of s and exp(−s delay).
 
     Columns are displacements, memory variables, integral, unknown friction stresses and the stresses `kept`. Rows,
     named as in `Linearisation`, are balances of forces, s times variables minus their rates, and stresses minus their

@@ -43,7 +43,7 @@ class OperatingPoint(HasCache):
     branch : int
         Index of the steady state, by rising normal stress, if there are several.
     valid : bool or ndarray of bool
-        True where conditions between several parameters hold; only scans contain False.
+        True where conditions between several parameters are met; False occurs only with `scan` of `operating_point`.
     """
 
     model: Model
@@ -68,9 +68,9 @@ class OperatingPoint(HasCache):
 
     @cached_property
     def sigmas(self) -> tuple[Any, ...]:
-        """Steady normal stress σss (Pa) of every contact, each over the varied parameters; NaN without steady sliding.
+        """Steady normal stress σss (Pa) of every contact over the varied parameters; NaN without steady sliding.
 
-        If there are several solutions, the one with index `branch`.
+        Of several solutions the one with index `branch` is taken.
         """
         return steady_stresses(self.model, self.arguments, self.branch)
 
@@ -144,7 +144,7 @@ class OperatingPoint(HasCache):
             yield OperatingPoint(self.model, part, (min(most, self.size - start),), self.wrap, self.branch)
 
     def part(self, rows: slice | np.ndarray) -> OperatingPoint:
-        """Point with some of the rigs of a flat point; steady states are not solved for again."""
+        """Point with the selected rigs of a point of one axis; steady states are reused."""
         if self.single:
             return self
         whole = (*self.arguments, *self.steady, self.valid)
@@ -213,7 +213,7 @@ def operating_point(
 
 @lru_cache(maxsize=256)
 def _cached_point(rig: Rig, branch: int) -> OperatingPoint:
-    """Cached point of a rig without varied parameters, with the cached results of earlier calls."""
+    """Operating point of a rig without varied parameters; cached, so that results derived from it are reused."""
     return _make_point(model_of(rig), rig, checked_arrays(rig, {}), branch, False)
 
 
@@ -248,7 +248,7 @@ def _axial_share(model: Model) -> Callable[[Mapping[str, Any]], Any]:
 
 
 def checked_arrays(rig: Rig, vary: Vary) -> BroadcastArrays:
-    """Check and broadcast varied values, by full dotted name."""
+    """Checked and broadcast arrays (SI units) of the varied parameters, by full dotted name."""
     known, problems = rig.parameters(), []
     checked: dict[str, Any] = {}
     for name, value in vary.items():

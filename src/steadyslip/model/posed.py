@@ -13,17 +13,17 @@ from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.weights import arrays_of, slip_rates, weights
 
-_UNDETERMINED = 1e-9  # share of the other dampings below which one determines no velocity
-MOST_NOISE = 1e-2  # change of ln v by rounding of forces, above which it affects the motion; chosen by trial
+_UNDETERMINED = 1e-9  # relative to other dampings; a smaller one does not determine a velocity
+MOST_NOISE = 1e-2  # largest accepted change of ln v due to rounding of forces; chosen by trial
 
 
 @cached
 def well_posed(point: OperatingPoint) -> np.ndarray:
-    """True where the motion near steady sliding is well-posed, (rigs,).
+    """True where the motion near steady sliding is well-posed, shape (rigs,).
 
-    The balances of forces must increase with their unknowns (velocities or accelerations); for several balances the
-    eigenvalues of the Jacobian must have positive real part. Otherwise arbitrarily small neglected lags or masses would
-    determine the motion.
+    The residual of a balance of forces must increase with its unknown (velocity or acceleration); for several balances
+    the eigenvalues of the Jacobian must have positive real part. Otherwise neglected lags or masses would determine the
+    motion, however small they are.
     """
     if point.model.is_single:
         return np.atleast_1d(weights(point).by_unknown > 0)
@@ -64,10 +64,11 @@ def balance_jacobian(model: Model) -> list[list[sp.Expr]]:
 
 
 def vanishing_terms(model: Model) -> list[tuple[sp.Expr, ...]]:
-    """Inertia and damping of each coordinate, without which its highest power of s is lost, and then the next.
+    """Coefficients of each coordinate whose vanishing lowers the degree in s: first its inertia, then its damping.
 
-    The damping only where no contact determines the velocity, and the equations have the one or the other. The sum over
-    all coordinates is `spare_powers` but for dampings that leave only combinations of velocities undetermined.
+    The damping is listed only if no contact determines the velocity and the equations contain inertia or damping. The
+    number of zeros over all coordinates is `spare_powers`, except where dampings leave only combinations of velocities
+    undetermined.
     """
     found = [(one.inertia,) if one.inertial else () for one in model.coordinates]
     for i in np.flatnonzero(~_of_contacts(model)):
@@ -79,11 +80,11 @@ def vanishing_terms(model: Model) -> list[tuple[sp.Expr, ...]]:
 
 @cached
 def spare_powers(point: OperatingPoint) -> np.ndarray:
-    """Number of highest powers of s that the characteristic equation may lose, (...): by inertias and dampings of 0.
+    """Number (...) by which inertias and dampings of 0 may lower the degree of the characteristic equation in s.
 
-    A coordinate with inertia counts two powers. Those without count as many as contacts, whose friction is supposed to
-    rise with velocity, and dampings determine of their velocities; springs determine the rest. If more are lost,
-    friction does not rise at once, and the equations are ill-posed.
+    A coordinate with inertia contributes two powers. Coordinates without inertia contribute one for each velocity that
+    a contact (if its friction rises with velocity) or a damping determines; springs determine the rest. If the degree
+    is still lower, friction does not rise with velocity at once, and the equations are ill-posed.
     """
     model, light = point.model, _light(point)
     powers = np.sum(np.where(light, 1, 2), axis=-1)
@@ -96,10 +97,10 @@ def spare_powers(point: OperatingPoint) -> np.ndarray:
 
 @cached
 def late_on_springs(point: OperatingPoint) -> np.ndarray:
-    """True where a force acts late on what it measures, a motion of bodies without mass that only springs hold, (...).
+    """True (...) where a delayed force acts on the motion it measures, of massless bodies held by springs only.
 
-    With a mass on the springs k, m s² + k + kp exp(−s delay) has ever more growing roots, which grow ever faster, the
-    smaller m is: without mass the equations are ill-posed, though their own roots may decay.
+    With a mass m on springs k, m s² + k + kp exp(−s delay) has more unstable roots, with larger growth rates, the
+    smaller m is. The equations without mass are therefore ill-posed, even if their own roots decay.
     """
     model, n = point.model, len(point.model.coordinates)
     late, found = _late_entries(model), np.zeros(point.shape, dtype=bool)
@@ -121,7 +122,7 @@ def late_on_springs(point: OperatingPoint) -> np.ndarray:
 
 @cached
 def _late_entries(model: Model) -> list[sp.Expr]:
-    """Slope of the force on each coordinate by each place and speed, at each delay, by rows (n, n); empty without."""
+    """Derivatives of coordinates' forces with respect to each delayed displacement or velocity, (n, n) by rows each."""
     linear = linearise(model)
     places = {symbol: one for one in model.coordinates for symbol in (one.displacement, one.velocity)}
     found = []
@@ -135,7 +136,7 @@ def _late_entries(model: Model) -> list[sp.Expr]:
 
 
 def _light(point: OperatingPoint) -> np.ndarray:
-    """True for each coordinate without inertia, (..., n)."""
+    """True for each coordinate without inertia, shape (..., n)."""
     model, inertial = point.model, _inertial(point.model)
     light = np.broadcast_to(~inertial, (*point.shape, len(inertial))).copy()
     masses = point.evaluate(model.function([one.inertia for one in model.coordinates if one.inertial]))
@@ -155,9 +156,9 @@ def _of_contacts(model: Model) -> np.ndarray:
 
 @cached
 def _dissipation_entries(model: Model) -> list[sp.Expr]:
-    """Matrix of dampings (n, n) between the coordinates of a machine, then the slip rate of each contact by velocity.
+    """Entries by rows of the damping matrix (n, n), then of the derivatives of slip rates by velocities (contacts, n).
 
-    By rows. Dampings are without friction, which is an unknown of its own.
+    The damping matrix is without friction, which is an unknown of its own.
     """
     linear, moving = linearise(model), [one.velocity for one in model.coordinates]
     slips = [sp.sympify(model.definitions.get(one.velocity, one.velocity)) for one in model.contacts]
@@ -172,7 +173,7 @@ def _dissipation(model: Model) -> ArrayFunction:
 
 @cached
 def _determined_in_general(model: Model) -> int:
-    """Number of velocities of coordinates without inertia that friction and dampings determine, for most values."""
+    """Number of massless coordinates' velocities that friction and dampings determine, for generic parameter values."""
     light = ~_inertial(model)
     if not np.any(light & ~_of_contacts(model)):
         return int(np.sum(light))
@@ -189,13 +190,13 @@ def _determined(values: np.ndarray, light: np.ndarray) -> np.ndarray:
 
 
 def _damped(values: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """Symmetric matrix (rigs, n, n) that vanishes for motions which neither dampings nor contacts resist."""
+    """Symmetric matrix (rigs, n, n) whose null space is the motions that neither dampings nor contacts resist."""
     whole = _resistance(values, light)
     return np.asarray(np.swapaxes(whole, 1, 2) @ whole + np.eye(light.shape[-1]) * ~light[:, None, :])
 
 
 def _resistance(values: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """Dampings and contacts on the coordinates `light` (rigs, n), made dimensionless, (rigs, n, n)."""
+    """Dimensionless resistance matrix (rigs, n, n) of dampings and contacts on the coordinates `light` (rigs, n)."""
     n = light.shape[-1]
     table = np.moveaxis(values.reshape(-1, n, len(light)), -1, 0) * light[:, None, :]
     dampings, slips = table[:, :n] * light[..., None], table[:, n:]
@@ -216,8 +217,8 @@ def _rising(model: Model) -> tuple[ArrayFunction, int]:
 def _force_function(model: Model, index: int) -> ArrayFunction:
     """Array function of the sizes of stresses (Pa) at a contact in steady sliding.
 
-    Change of the pull by dashpots per e-fold of v; changes of σ by pull and friction; then stresses that cancel: pull,
-    friction, and the contributions of normal stress and memory to friction.
+    In this order: change of the pull by dashpots per e-fold of v; changes of σ by pull and friction; pull; friction;
+    contributions of normal stress and memory to friction.
     """
     contact = model.contacts[index]
     inner = [contact.normal, *(item.symbol for item in contact.memory)]
@@ -232,12 +233,12 @@ def _force_function(model: Model, index: int) -> ArrayFunction:
 
 @cached
 def resolved(point: OperatingPoint) -> np.ndarray:
-    """True where rounding of the forces changes the velocity of steady sliding insignificantly, (rigs,).
+    """True where rounding of forces changes ln v in steady sliding by less than `MOST_NOISE`, shape (rigs,).
 
     Rounding of the balance changes ln v by the error over the slope of the balance in ln v; with inertia, over the
-    direct effect plus the inertia needed to change the velocity within a natural slip distance. Rounding of velocities
-    must change the force of dashpots, and rounding of forces the normal stress, by little as well. Also True where the
-    motion is ill-posed, which is reported instead.
+    direct effect plus the inertia needed to change the velocity within a natural slip distance. The effects of rounding
+    of velocities on dashpot forces, and of forces on the normal stress, must be as small. Also True where the motion is
+    ill-posed, which is reported separately.
     """
     apart = np.ones(1, dtype=bool)
     for index in range(len(point.model.contacts)):

@@ -3,9 +3,9 @@
 The slopes enter the characteristic polynomial, so its coefficients are checked: an infinite slope, or a product that
 overflows, makes a coefficient infinite or NaN. All stages check the range before they compute.
 
-An exponential that underflows must not change the degree. Friction of a body without mass falls by exp(−(v/v_S)²) of
-its drop: from 26 Stribeck velocities on that is below exp(−700), and a root is lost with it, or is nothing but
-rounding. Arrays of rigs and pages ask the same functions.
+An exponential that underflows must not change the degree. The Stribeck term of friction contains exp(−(v/v_S)²): above
+26 Stribeck velocities that is below exp(−700), and for a body without mass a root is lost with it, or is only rounding
+error. Single rigs, arrays of rigs and pages use the functions here.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from steadyslip.model.point import OperatingPoint, stacked
 from steadyslip.model.steady import out_of_range
 
 ORDINARY = 1e20
-"""Largest size of ordinary numbers, whose inverse is the smallest: products of a dozen stay below 1e308."""
+"""Numbers from 1/ORDINARY to ORDINARY count as ordinary: products of a dozen stay below 1e308."""
 _REDUCED_DECADES = (0.75, 0.5, 0.25, 0.0)
-"""Factors on the decimal exponent of a parameter by which its influence on the range is tested; chosen by trial."""
+"""Factors on a parameter's decimal exponent, with which its influence on the range is tested; chosen by trial."""
 
 
 @cached
@@ -79,7 +79,7 @@ def delays_of(point: OperatingPoint) -> Array:
 
 @cached
 def delays_in_terms(model: Model) -> NDArray[np.bool_]:
-    """Table (m, d): True where a term of the quasipolynomial is delayed by a delay of the equations."""
+    """Table (m terms of the quasipolynomial, d delays): True where the delay acts in the term."""
     return np.array([[own in late for own in model.delays] for late in delays_of_terms(model)], dtype=bool)
 
 
@@ -103,10 +103,11 @@ def _steady_function(model: Model) -> ArrayFunction:
 
 @cached
 def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True for each rig whose values and slopes of the equations in steady sliding are finite, shape of the point.
+    """True for each rig (shape of the point) whose equations have finite values and slopes in steady sliding.
 
-    Without steady sliding: True if the equation for the normal stress is finite, so that its absence is certain. False
-    for rigs of an array whose eigenvalues rounding hides; those of a single rig are computed with many digits.
+    Without steady sliding, True if the equation for the normal stress is finite, so that steady sliding certainly does
+    not exist. False for rigs of an array whose eigenvalues are lost to rounding (`digits_lost`); a single rig's
+    eigenvalues are computed in higher precision then.
     """
     with np.errstate(all="ignore"):
         slopes = _finite_slopes(point)
@@ -121,7 +122,7 @@ def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def _finite_slopes(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where the slopes of the equations are finite: by the polynomial, or where it is too long by eigenvalues."""
+    """True where the slopes of the equations are finite, judged by polynomial coefficients or else eigenvalues."""
     if not (point.model.delays or is_written_out(point.model)):
         return np.asarray(np.any(np.isfinite(eigenvalues_of(point)), axis=-1))
     c, _ = quasipolynomial(point)
@@ -166,7 +167,7 @@ def require_range(point: OperatingPoint) -> None:
 
 
 def require_digits(point: OperatingPoint) -> None:
-    """Raise NotAvailable if rounding hides eigenvalues of a single rig in arrays, with which edges are searched.
+    """Raise NotAvailable if eigenvalues of a single rig are lost to rounding in double precision, which searches use.
 
     Raises
     ------
@@ -178,7 +179,7 @@ def require_digits(point: OperatingPoint) -> None:
 
 
 def hidden_by_stiffest(point: OperatingPoint) -> str:
-    """Clause on why eigenvalues of a single rig are hidden, and what to do."""
+    """Clause of a message: the reason why eigenvalues of a single rig are lost to rounding, and the remedy."""
     stiff = max(point.model.with_role("stiffness"), key=lambda name: float(point.named()[name]), default="")
     which = (
         f"; {stiff} = {float(point.named()[stiff]):.4g} {point.model.roles[stiff].unit} is the largest" if stiff else ""
@@ -248,18 +249,18 @@ def _in_range_if_moderate(point: OperatingPoint, numbers: Array, decades: Array,
 
 
 Pair = tuple[Any, Any]
-"""A coefficient with vanishing exponentials set to zero, and with exponents bounded below by `_REPLACEMENT`."""
+"""Two forms of a coefficient: with underflowing exponentials set to 0, and with exponents not below `_REPLACEMENT`."""
 _LEAST = -700.0
 """Exponent below which exp underflows or loses digits (the smallest normal float is exp(−708))."""
 _REPLACEMENT = -100.0
-"""Replacement of smaller exponents in the test of their influence; products of seven exp(−100) do not underflow."""
+"""Least exponent in the test whether an exponential matters; products of seven exp(−100) do not underflow."""
 _SMALL = -300.0
-"""Exponent above which products of an exponential with parameters are not expected to underflow."""
+"""Exponent above which an exponential times parameters is not expected to underflow."""
 _ABSENT = -1e6  # degree of a zero entry, so that no product of entries with it is the largest
 
 
 def loses_highest_power(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where the highest power of s in the characteristic equation vanishes only by underflow, shape of point."""
+    """True (shape of the point) where the characteristic equation's highest power of s vanishes by underflow only."""
     small = np.zeros(point.shape, dtype=bool)
     for one in point.evaluate(_exponents(point.model)):
         small = small | (np.asarray(one) < _SMALL)
@@ -273,9 +274,9 @@ def loses_highest_power(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def highest_coefficients(model: Model) -> list[list[Pair]]:
-    """Coefficients of the characteristic equation that exponentials can take away, from the highest power of s down.
+    """Coefficients of the characteristic equation that may vanish as exponentials underflow, highest power of s first.
 
-    For each power the coefficient of each term, that without delay first; empty if there are no exponentials.
+    For each power the coefficients of all terms, the term without delay first; empty if there are no exponentials.
     """
     terms = [term.coefficients for term in characteristic_terms(model)]
     rows = [list(row) for row in zip(*terms, strict=True)]
@@ -284,16 +285,16 @@ def highest_coefficients(model: Model) -> list[list[Pair]]:
 
 
 def highest_is_lost(levels: Sequence[Sequence[Pair]], choose: Choose = np.where) -> Any:
-    """1 where the highest coefficient that is not 0 vanishes by underflow, else 0; takes `highest_coefficients`.
+    """1 where the highest coefficient (of `highest_coefficients`) vanishes only by underflow, else 0.
 
     A term with a delay counts above the highest power without delay: there it makes the equation ill-posed.
 
     Parameters
     ----------
     levels : sequence of sequence of pairs
-        Numbers, arrays or nodes of a program.
+        Numbers, arrays, or nodes of a generated program.
     choose : callable
-        ``choose(condition, value, other)``; that of a program, where values are its nodes.
+        Function ``choose(condition, value, other)``; for nodes of a generated program, the program's own.
     """
     lost, is_open = 0.0, 1.0
     for level in levels:
@@ -306,14 +307,14 @@ def highest_is_lost(levels: Sequence[Sequence[Pair]], choose: Choose = np.where)
 
 
 def _loses_generic_degree(point: OperatingPoint) -> NDArray[np.bool_]:
-    """As `loses_highest_power` where the equation is known as a matrix in s only: its degree but for cancellations."""
+    """`loses_highest_power` for equations known only as a matrix in s; its degree is that without cancellations."""
     from scipy.optimize import linear_sum_assignment  # slow to import
 
     function, places, size = _matrix_function(point.model)
     values = np.stack([np.broadcast_to(one, point.shape) for one in point.evaluate(function)], axis=-1)
     lost = np.zeros(point.shape, dtype=bool)
     for index in np.ndindex(point.shape):
-        degrees = []  # without and with the delayed entries, of zeroed and of bounded exponentials
+        degrees = []  # without, then with delayed entries; each with exponentials set to 0, then bounded below
         for with_delays in (False, True):
             for start in (0, 1):
                 matrix = np.full((size, size), _ABSENT)
@@ -328,7 +329,7 @@ def _loses_generic_degree(point: OperatingPoint) -> NDArray[np.bool_]:
 
 @cached
 def _matrix_function(model: Model) -> tuple[ArrayFunction, list[tuple[int, int, int, bool]], int]:
-    """Array function of pairs of entries of the characteristic matrix; row, column, power and delay of each; size."""
+    """Array function of a `Pair` per entry of the characteristic matrix; (row, column, power, is late); matrix size."""
     rows = list(characteristic_rows(model).values())
     places, entries = [], []
     for i, row in enumerate(rows):

@@ -6,11 +6,11 @@ that acts there, in one of three forms:
 
 - *eliminated*: logarithmic laws. ln v is integrated, and one memory variable follows from the balance, which is linear
   in it; no equation has to be solved numerically, and the balance cannot drift.
-- *explicit*: the velocity variables have a closed form.
-- *implicit*: Newton's method finds them at every evaluation.
+- *explicit*: the balances have a closed solution for the velocity variables.
+- *implicit*: Newton's method solves the balances for the velocity variables at every evaluation.
 
-Accelerations have a closed form if balances are linear in them, and so have friction stresses if the law is linear in
-the normal force that depends on them. All remaining unknowns are solved for together (`unknowns.py`).
+Accelerations have a closed form if the balances are linear in them; friction stresses have one if the law is linear in
+the normal force that depends on them. All remaining unknowns are solved for together by Newton's method.
 
 The balance of a massless coordinate without contact is linear; it is solved for the velocity or, without a dashpot, for
 the displacement.
@@ -40,13 +40,13 @@ Equations = list[tuple[sp.Expr, sp.Symbol]]
 EVERYWHERE = "*"
 """Name meaning that a disturbance acts on every coordinate, or at every contact, with a constant share for each."""
 FREE, SWITCH = f"{LOAD_POINT}.free", f"{LOAD_POINT}.switch"
-"""Names of disturbance channels of a released drive: 1 while the force is imposed, else 0; and at segments where that
-changes, 1 to keep the present force, 2 to take the imposed one."""
+"""Names of disturbance channels of a released drive. FREE: 1 while the force is imposed, else 0. SWITCH: nonzero at
+segments where FREE changes, 1 to keep the present force, 2 to take the imposed force."""
 PORES = ".pores"
 """Suffix of a contact's name: the channel changes the surrounding pore pressure instead of the normal stress."""
 STANDSTILL = -200
-"""Lower bound of ln(v/v0) in the rates of blocks with mass: far below any motion of interest, and powers of 1/v up to
-the third stay below 1e308."""
+"""Lower bound of ln(v/v0) in the rates of blocks with mass: v is far below any velocity of interest, and powers of 1/v
+up to the third stay below 1e308."""
 
 
 @cached
@@ -64,18 +64,19 @@ def reduce_model(
     model : Model
     eliminate : int or tuple of int, optional
         Index of the memory variable (of its contact) that follows from the balance if the form *eliminated* is
-        possible, for all contacts or one for each; None forbids that form (the variable has little weight in friction).
+        possible; one index for all contacts or one for each. None forbids that form, for variables of little weight in
+        friction.
     pushes, presses : tuple of str, optional
-        Names of the coordinates and contacts on which disturbances and normal stresses act, one channel each; or
-        `EVERYWHERE`. A push may be `steadyslip.machine.mechanism.LOAD_POINT`, a press a contact's name with `PORES`
-        appended. A slider needs no names.
+        Names of the coordinates on which disturbances act, and of the contacts with added normal stress, one channel
+        each; or `EVERYWHERE`. `pushes` may contain `steadyslip.machine.mechanism.LOAD_POINT`, `presses` a contact's
+        name with `PORES` appended. A slider needs no names.
     order : int, optional
-        Variables of each late signal, if the model has delays.
+        Number of variables of each late signal, if the model has delays.
 
     Raises
     ------
     NotAvailable
-        If the motion cannot be brought into this form.
+        If the equations cannot be brought into one of the three forms.
     """
     model = model if model.for_motion is None else model.for_motion(order)
     each = eliminate if isinstance(eliminate, tuple) else (eliminate,) * len(model.contacts)
@@ -133,7 +134,7 @@ class _Reducer:
         return self._variables(coordinate.balance, None)
 
     def _solve_frictions(self) -> None:
-        """Solve for unknown friction stresses: by the friction law, or without inertia by the balance of forces."""
+        """Solve the friction law (without inertia the balance of forces) for each unknown friction stress."""
         equations = []
         for i, contact in enumerate(self.model.contacts):
             if contact.friction in self.model.definitions:
@@ -221,7 +222,7 @@ class _Reducer:
         )
 
     def _sped(self, heavy: list[Coordinate]) -> Iterator[tuple[sp.Symbol, sp.Expr]]:
-        """Velocity variables that a jump of the load point's velocity changes, with their values after it."""
+        """Velocity variables that a jump of the load point's velocity changes, with their values after the jump."""
         drive = self.model.inputs["load_velocity"]
         for i in (self.moving.contact_at(one) for one in heavy):
             if i is None or (variable := self.moving.variables[i]) is None:
@@ -230,7 +231,7 @@ class _Reducer:
             share = derivative(sp.sympify(self.model.definitions.get(velocity, velocity)), drive)
             if share == 0:
                 continue
-            if variable.kind == "logarithm":  # without the rounding of a tiny slip rate
+            if variable.kind == "logarithm":  # this form is accurate for tiny slip rates
                 yield variable.w, variable.w + sp.log(1 + share * JUMP * sp.exp(-variable.w) / variable.scale)
             else:
                 yield variable.w, variable.w_of_v.xreplace({velocity: variable.of_w + share * JUMP})
@@ -250,11 +251,11 @@ class _Reducer:
         self.unknowns = [(self._in_state(residual), symbol) for residual, symbol in (*velocities, *self.others)]
 
     def _restarts(self) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
-        """Unknowns after a jump with their balances, if there are massless contacts: `unknowns` first."""
+        """Variables solved for after a jump, with their balances; `unknowns` first; empty without massless contacts."""
         if not self.light:
             return ()
         frictions = {contact.friction for contact in self.model.contacts}
-        # balances must rise with their unknowns; a law minus friction falls
+        # a balance must rise with its unknown; the friction law minus the friction stress falls, hence the sign
         known = {symbol: -e if symbol in frictions else e for e, symbol in self.others}
         known |= {w: balance for balance, w in self.light}
         return tuple(({symbol: known[symbol] for _, symbol in self.unknowns} | known).items())
@@ -294,7 +295,7 @@ class _Reducer:
         return found
 
     def eliminated_memory(self, index: int, which: int | None) -> Replacements | None:
-        """Memory variable of a contact solved from its balance; None if that is not linear in it."""
+        """Memory variable of a contact solved from its balance; None if the balance is not linear in the variable."""
         variable, memory = self.moving.variables[index], self.model.contacts[index].memory
         if variable is None or variable.kind != "logarithm" or which is None or which >= len(memory):
             return None
@@ -338,7 +339,7 @@ class _Reducer:
         self.raw = {symbol: replaced(rate, solved) for symbol, rate in self.raw.items()}
 
     def _coupled_unknowns(self) -> Equations:
-        """Unknown friction stresses and accelerations on which massless velocities depend, directly or not."""
+        """Unknown friction stresses and accelerations on which massless velocities depend, directly or indirectly."""
         found: Equations = []
         among = [*(balance for balance, _ in self.light), *self.found.values()]
         while more := [(e, s) for e, s in self.others if (e, s) not in found and any(one.has(s) for one in among)]:
@@ -352,7 +353,7 @@ class _Reducer:
         return sp.Add(*terms, *self._in_time(expression))
 
     def _in_time(self, expression: sp.Expr) -> list[sp.Expr]:
-        """Terms of the time derivative of an expression through the inputs."""
+        """Terms of the time derivative of an expression that come from the inputs."""
         terms = [derivative(expression, s) * slope_of(s) for s in self.channels]
         return [*terms, derivative(expression, TIME)]
 
@@ -418,7 +419,7 @@ class _Reducer:
 def _inputs(
     model: Model, channels: tuple[sp.Symbol, ...], pushes: tuple[str, ...], presses: tuple[str, ...]
 ) -> Replacements:  # fmt: skip
-    """Substitution of the Model's inputs by channels, by a share of one for `EVERYWHERE`, or by zero."""
+    """Replacement of each input of the Model: its channel, its share of the `EVERYWHERE` channel, or zero."""
     _, first_push, first_press, *more = channels
     given: Replacements = {model.inputs["load_velocity"]: V_LP, model.inputs["time"]: TIME}
     behind = max(len(pushes) - 1, 0)
@@ -453,9 +454,9 @@ def share_of(input_: sp.Symbol) -> sp.Symbol:
 
 
 def _bounded_rate(rate: sp.Expr, w: sp.Symbol) -> sp.Expr:
-    """Rate with exp(w) bounded below at w = `STANDSTILL`, while other terms keep w itself.
+    """Rate with exp(w) replaced by exp(max(w, `STANDSTILL`)); w outside exponentials is unchanged.
 
-    A block pulled back far below its strength would otherwise lead to division by a velocity that underflows.
+    For a block pulled far less than its strength, the rate would otherwise divide by a velocity that underflows.
     """
     least = sp.Piecewise((w, w > STANDSTILL), (sp.Integer(STANDSTILL), True))
     bounded = inner_symbol("w_bounded", real=True)  # substituted last, so that the condition keeps w itself

@@ -1,6 +1,6 @@
 """The Reduction class: a Model as an ordinary differential equation with explicit rates.
 
-Unknowns that are determined together by equations are differentiated implicitly.
+Unknowns without a closed form are determined by residuals and differentiated implicitly.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Sliding:
 
     @property
     def one_way(self) -> bool:
-        """True if the law knows forward slip alone: its velocity variable is a logarithm."""
+        """True if the friction law is defined for forward slip only: its velocity variable is a logarithm."""
         return self.variable is not None and self.variable.kind == "logarithm"
 
 
@@ -97,7 +97,7 @@ class Reduction(HasCache):
     slidings : tuple of Sliding
         Contacts, in the order of the Model.
     shifts : tuple of sympy.Expr
-        Decrease of each displacement (the first ones of `continuous`) per unit jump of the load point.
+        Decrease of each displacement (the first items of `continuous`) per unit jump of the load point.
     sped : tuple of (sympy.Symbol, sympy.Expr)
         Velocity variables of bodies with inertia on which the drive slides, after a jump `JUMP` of the load point's
         velocity, as functions of `continuous` before it: the bodies keep their own velocities.
@@ -193,7 +193,7 @@ class Reduction(HasCache):
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """Unknowns and as many residuals, which are zero in motion.
+    """Unknowns and an equal number of residuals, which are zero in motion.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ class Unknowns:
         return [[derivative(residual, symbol) for symbol in self.symbols] for residual in self.residuals]
 
     def followed(self, expression: sp.Expr, perturbation: Sequence[sp.Expr]) -> sp.Expr:
-        """First-order change of an expression through the unknowns for a `perturbation` of the residuals."""
+        """First-order change of an expression through the unknowns, for a `perturbation` of the residuals."""
         own = [(k, derivative(expression, symbol)) for k, symbol in enumerate(self.symbols) if expression.has(symbol)]
         if not own:
             return sp.Integer(0)
@@ -218,7 +218,7 @@ class Unknowns:
         return sp.Add(*(slope * changes[k] for k, slope in own))
 
     def along(self, expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
-        """Total derivative with respect to a variable, with the unknowns following so that the residuals stay zero."""
+        """Total derivative with respect to a variable, with unknowns that change so that the residuals stay zero."""
         own = [derivative(residual, variable) for residual in self.residuals]
         return derivative(expression, variable) + self.followed(expression, own)
 
@@ -237,7 +237,7 @@ class Unknowns:
 
     @cached_property
     def _factors(self) -> tuple[list[tuple[int, list[sp.Expr]]], list[tuple[int, int, sp.Expr]]]:
-        """LU factors: rows of the upper triangle with their equation; steps (i, k, f), equation i minus f times k."""
+        """LU factors: equations with rows of the upper triangle; steps (i, k, f), equation i minus f times k."""
         rows, factors = list(enumerate(map(list, self.matrix))), []
         for k in range(len(rows)):
             pivot = next((i for i in range(k, len(rows)) if rows[i][1][k] != 0), None)

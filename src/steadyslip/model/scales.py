@@ -23,7 +23,7 @@ _LEAST_DIRECT_SHARE = 1e-7  # lower bound of the direct effect in scales, relati
 def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping[str, Any], tuple[Any, ...]]:
     """Typical size of each state variable, by name, and of each unknown of `Reduction.searched` (at least one value).
 
-    The size is the change that goes with one e-fold of velocity, or a slip distance; SI units, arrays over the point.
+    SI units, arrays over the point. The size is the change for one e-fold of velocity, or a natural slip distance.
     """
     speeds = [np.asarray(speed, dtype=float) for speed in slip_rates(point)]
     with np.errstate(all="ignore"):
@@ -37,9 +37,9 @@ def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping
 
 
 def memory_scales(point: OperatingPoint) -> dict[str, float]:
-    """Change of each memory variable of a slider that goes with one e-fold of velocity, by name; 1 without a weight.
+    """Change of each memory variable of a slider for one e-fold of velocity, by name; 1 if friction ignores it.
 
-    Unlike its natural scale, that of a logarithm is no smaller where its steady value happens to be near 0.
+    Unlike `natural_scales`, it is not reduced where the steady value of the variable happens to be near 0.
     """
     found = weights(point, 0)
     direct = direct_effect_scale(found, np.where)
@@ -78,8 +78,9 @@ def _choose(condition: Any, value: Any, other: Any) -> Any:
 
 
 def scale_expressions(model: Model) -> list[sp.Expr]:
-    """Expressions that set the scales of a machine: steady speeds of coordinates, their shares in the slip of every
-    contact, their stiffnesses; areas of contacts.
+    """Expressions that determine the scales of a machine, in the order used by `machine_scales`.
+
+    Steady speeds of coordinates; slip of each contact per displacement of each coordinate; stiffnesses; contact areas.
     """
     wanted = [one.speed for one in model.coordinates]
     for contact in model.contacts:
@@ -98,7 +99,7 @@ def _moving_function(model: Model) -> ArrayFunction:
 def _machine_scales_of(
     point: OperatingPoint, reduction: Reduction, speeds: list[Any], each: list[tuple[dict[str, Any], Any]]
 ) -> tuple[dict[str, Any], tuple[Any, ...]]:
-    """Natural scales of a machine from those at its contacts."""
+    """Natural scales of a machine from the scales `each` at its contacts."""
     numbers = [np.asarray(e, dtype=float) for e in point.evaluate(_moving_function(point.model))]
     directs = [direct_effect_scale(weights(point, i), np.where) for i in range(len(point.model.contacts))]
     scales, searched = machine_scales(reduction, numbers, speeds, point.sigmas, directs, each, np.where)
@@ -114,7 +115,7 @@ def machine_scales(
     each: Sequence[tuple[dict[str, Any], Any]],
     choose: Choose,
 ) -> tuple[dict[str, Any], tuple[Any, ...]]:
-    """Natural scales of a machine in plain arithmetic, for arrays or nodes of a program.
+    """Natural scales of a machine in plain arithmetic, for arrays or nodes of a generated program.
 
     The scale of a displacement is the smallest that gives a natural slip distance at a contact; without contact, the
     motion within the shortest natural time; at rest, the stretch of its springs by the largest friction force.
@@ -152,7 +153,7 @@ def machine_scales(
         scales[f"{one.name}.x"] = x
         scales[f"{one.name}.v"] = choose(abs(own[k]) > 0, abs(own[k]), x / time)
     for contact, stress, direct in zip(model.contacts, stresses, directs, strict=True):
-        # pressures change friction by about their own size
+        # states of contact laws are pressures: they change friction by about their own size
         scales |= {item.name: choose(direct > 0, direct, abs(stress)) for item in contact.own_states}
     for (found, _), contact in zip(each, model.contacts, strict=True):
         scales |= {item.name: found[item.name] for item in contact.memory} | {f"{contact.name}.{SPEED}": found[SPEED]}
@@ -195,7 +196,7 @@ def direct_effect_scale(found: Weights, choose: Choose) -> Any:
 
 
 def _is_speed(past: Variable) -> bool:
-    """True for a part of a late slip rate, false of a late force."""
+    """True for a variable of a late slip rate, False for one of a late force."""
     return past.unit == "m/s"
 
 
@@ -204,8 +205,8 @@ def contact_scales(
 ) -> tuple[dict[str, Any], Any]:
     """Natural scales of the variables of one contact, and of its unknown, in plain arithmetic.
 
-    For arrays or nodes of a program. The scale of an acceleration is at least that whose inertial force equals the
-    effect of one e-fold of velocity: smaller ones of a light block are lost in the rounding of the forces.
+    For arrays or nodes of a generated program. An acceleration of this scale has an inertial force of at least the
+    effect of one e-fold of velocity: smaller accelerations of a light block are lost in the rounding of forces.
 
     Parameters
     ----------
@@ -225,7 +226,7 @@ def contact_scales(
     for item, weight, value in zip(contact.memory, found.by_memory, found.memory, strict=True):
         own, scale = abs(value), direct / abs(weight)
         scale = choose((scale > 0) & (scale < np.inf), scale, choose(own > 0, own, 1.0))
-        most = choose(own > 1e-3 * scale, own, 1e-3 * scale)  # the steady value if smaller, within 1e-3; by trial
+        most = choose(own > 1e-3 * scale, own, 1e-3 * scale)  # steady value, at least 1e-3 of the scale; by trial
         scales[item.name] = choose((own > 0) & (most < scale), most, scale)
     scales |= {item.name: choose(direct > 0, direct, by_slip * x) for item in contact.own_states}
     scales |= {item.name: x * x / drive for item in reduction.model.integrals}

@@ -26,7 +26,7 @@ from steadyslip.model.range import require_range
 from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
 from steadyslip.model.steady_results import ABSENT, SteadyContact, SteadyMachine, SteadySliding
 
-REFERENCE = 1e6  # normal stress, Pa, at which messages tell a friction coefficient that may depend on it
+REFERENCE = 1e6  # Pa; normal stress at which messages give the friction coefficient
 
 
 @overload
@@ -63,7 +63,7 @@ def steady_state(rig: Slider | Machine) -> SteadySliding | SteadyMachine:
 
 
 def steady_machine(rig: Machine) -> SteadyMachine:
-    """Steady sliding of a machine.
+    """Steady sliding of a machine, with forces of contacts and links.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def steady_states(rig: Machine) -> tuple[SteadyMachine, ...]: ...
 
 @checked()
 def steady_states(rig: Slider | Machine) -> tuple[SteadySliding, ...] | tuple[SteadyMachine, ...]:
-    """All states of steady sliding of a slider, by rising normal stress; the only one of a machine.
+    """All states of steady sliding of a slider, by rising normal stress; the single state of a machine.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def steady_contact_at(rig: Machine, contact: str, velocities: np.ndarray) -> dic
 
 
 def explain_absence(rig: Rig, point: OperatingPoint) -> NoSteadySliding:
-    """Make the NoSteadySliding error of a rig, with condition, shortfall and contact.
+    """Make the NoSteadySliding error of a rig; it names the failing condition, the shortfall and the contact.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySlid
     """Error for contacts with coupled steady normal stresses."""
     contacts = point.model.contacts
     sigma, gain = joint.solve(point.arguments)
-    least = int(np.argmin(sigma))  # just beyond lock-up that which the others press most
+    least = int(np.argmin(sigma))  # just beyond lock-up: the contact that the others press most
     name = contacts[least].name
     if not gain < 1:
         words = ABSENT["together"].format(at=_at(name), margin=f"{1 - gain:.4g}")

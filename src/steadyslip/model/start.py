@@ -74,7 +74,7 @@ def coordinate_speeds(model: Model) -> ArrayFunction:
 
 @cached
 def _drive_force(model: Model) -> ArrayFunction:
-    """Array function of the drive's force caused by its motion, minus that of steady sliding, before the protocol."""
+    """Array function of the drive's force due to its motion, minus its steady value, when the protocol starts."""
     own, moves = model.letting_go, model.inputs["load_velocity"]
     force = sp.Integer(0) if own is None else own.driven.xreplace({moves: model.steady[moves]})
     given = (*(one.displacement for one in model.coordinates), *(one.velocity for one in model.coordinates))
@@ -83,7 +83,7 @@ def _drive_force(model: Model) -> ArrayFunction:
 
 @cached
 def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
-    """Balance of a massless slider before the protocol and its slope in one memory variable; True if it is linear."""
+    """Array function of a massless slider's balance and its slope in one memory variable; True if linear in it."""
     model = reduction.model
     memory = [item.symbol for item in model.memory]
     ((w, balance),) = reduction.restarts
@@ -101,13 +101,13 @@ def initial_values(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Initial values of the continuous variables, (rigs, variables), and slip rate of the first contact, (rigs,).
 
-    Steady sliding for all variables that are not given. Without mass a velocity can be given only if a memory variable
-    is not: the first such variable follows from the balance of forces.
+    Variables that are not given have their steady values. Without mass, a velocity can be given only if at least one
+    memory variable is not: the first memory variable not given follows from the balance of forces.
 
     Parameters
     ----------
     free : float or ndarray, optional
-        1 where the motion begins with a released drive, whose force is then continuous; else 0.
+        1 where the motion begins with a released drive (its force stays continuous), else 0.
 
     Raises
     ------
@@ -202,10 +202,10 @@ def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.nda
 
 
 def _matching_memory(reduction: Reduction, point: OperatingPoint, x: Any, v: Any, memory: list[Any], index: int) -> Any:
-    """Memory variable that balances the forces at a given velocity, by Newton's method (one step if linear)."""
+    """Value of a memory variable that balances the forces at a given velocity, by Newton's method."""
     function, linear = _balance(reduction, index)
     current = list(memory)
-    for _ in range(1 if linear else 60):  # Newton converges in far fewer steps; chosen by trial
+    for _ in range(1 if linear else 60):  # bound on Newton steps, far more than needed; chosen by trial
         with np.errstate(all="ignore"):
             residual, slope = point.evaluate(function, x, v, *current)
             change = residual / slope

@@ -4,8 +4,8 @@ With given friction and normal stresses, the balances of forces at steady speeds
 are solved exactly, so that stiffnesses cancel in forces that do not depend on them (the pull on a single block, the
 force in a chain of links).
 
-If bodies are supported in several ways, as in the plane, the exact solution soon fills pages. Forces and displacements
-are then symbols, `Carried`, and their equations are solved numerically at every operating point.
+If bodies are supported by several links each, as in the plane, the exact solution is too long. Forces and displacements
+are then symbols (`Carried`), and their equations are solved numerically at every operating point.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ SymbolFactory = Callable[..., sp.Symbol]
 class Statics:
     """Displacements from the unstressed state of springs, and integral of the controller, in steady sliding.
 
-    `tensions` are symbols of spring forces by `id` of the element, if they are symbols with equations `carried`.
+    Without a symbolic solution, `tensions` are symbols of spring forces by `id` of the element, and `carried` has the
+    equations that determine them.
     """
 
     displacement: Mapping[str, sp.Expr]
@@ -58,7 +59,7 @@ def row_of(row: Shares, values: Mapping[str, Any]) -> sp.Expr:
 
 @dataclass(frozen=True)
 class NormalStress:
-    """Normal stress of a contact as a linear function of the distance: value at first touch, and slope (Pa/m)."""
+    """Normal stress of a contact, linear in the distance: value at first touch (Pa), and slope (Pa/m)."""
 
     at_contact: sp.Expr
     slope: sp.Expr
@@ -77,9 +78,9 @@ def statics(
     mechanism : Mechanism
     friction : dict of str to sympy.Symbol
         Steady friction stress of each contact.
-    normal : dict of str to Press
-    lettered : callable
-        Function of a symbol's name and a dotted name, from which its letter is made; see `Letters.symbol`.
+    normal : dict of str to NormalStress
+    make_symbol : callable
+        Function that makes a symbol from its name and the dotted name of which its letter is made: `Letters.symbol`.
     """
     names = [one.name for one in mechanism.coordinates]
     places = {name: inner_symbol(f"place.{i}") for i, name in enumerate(names)}
@@ -98,7 +99,7 @@ def _balances(
     mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, NormalStress],
     places: Mapping[str, sp.Expr], held: sp.Expr, tensions: Mapping[int, sp.Expr],
 ) -> list[sp.Expr]:  # fmt: skip
-    """Residuals of the statics: integrated controller error, if any, and force on every coordinate."""
+    """Residuals of the statics: error of the controller, if there is one, then force on every coordinate."""
     integral = mechanism.integral
     speeds = {one.name: sp.sympify(one.speed) for one in mechanism.coordinates} | {LOAD_POINT: mechanism.velocity}
     equations = [] if integral is None else [row_of(integral.senses, places)]
@@ -175,7 +176,7 @@ def _solve(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr]
         DomainMatrix([[ring.from_sympy(one) for one in row] for row in rows], (len(rows), len(rows[0])), ring)
         for rows in (matrix, right)
     )
-    try:  # polynomials over one denominator: quotients at every step would be cancelled, which takes a thousand times
+    try:  # polynomials over one denominator: cancelling quotients at every step takes a thousand times as long
         tops, below = table.solve_den(known, method="rref")
     except (DMNonInvertibleMatrixError, ZeroDivisionError):
         raise NotAvailable(UNHELD) from None

@@ -1,8 +1,8 @@
-"""Solution for the steady normal stresses.
+"""Steady normal stresses of contacts: their equations and solutions.
 
 σss solves σ = contact(x = 0, v = v0, v̇ = 0, T = τss + ηv0, τ = τss(v0, σ)) and must be positive (theory 3). If the
-contact is linear in the stresses, σss = (σ0 + g0)/(1 − g1), with g0 + g1 σ the coupling in steady sliding: g1 >= 1 is
-lock-up (friction grows faster than the spring can pull), σ0 + g0 <= 0 lift-off.
+contact is linear in the stresses, σss = (σ0 + g0)/(1 − g1), with g0 + g1 σ the coupling in steady sliding. g1 >= 1 is
+lock-up (friction grows faster than the spring can pull), σ0 + g0 <= 0 is lift-off.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from steadyslip.model.equations import Carried, Entries, Model
 
 Arguments = tuple[Any, ...]
 GRID = np.geomspace(1e-12, 1e18, 6001)  # Pa; grid for sign changes, 200 points per decade; chosen by trial
-ROOT_TOLERANCE = 1e-6  # residual over stress, above which a change of sign is a pole and not a root
-_NEARLY_REAL = 1e-9  # relative imaginary part of an eigenvalue that counts as rounding; chosen by trial
+ROOT_TOLERANCE = 1e-6  # residual relative to the stress; above it a change of sign is a pole and not a root
+_NEARLY_REAL = 1e-9  # largest relative imaginary part of an eigenvalue that counts as real; chosen by trial
 _BATCH = 64  # rigs searched at once, so that arrays stay in the processor's cache
-MAX_BENDS = 8  # amounts |e| in coupled equations; each doubles the linear systems that are solved
-_HALVINGS = 48  # bisections: a cell is 0.012 of its stress wide, and 0.012 / 2**48 is below rounding
+MAX_BENDS = 8  # most absolute values |e| in coupled equations; each doubles the number of linear systems to solve
+_HALVINGS = 48  # bisection steps: a cell of `GRID` is 0.012 of its stress wide, and 0.012 / 2**48 is below rounding
 
 
 @dataclass(frozen=True)
 class SteadyEquation:
     """Equation of the steady normal stress of one contact; in closed form if the contact is linear in the stresses.
 
-    ``parts(*arguments)`` returns (load, g0, g1), where load is σss itself if that is `given`; `sigma` and `slope` are
-    the expressions of σss and g1. Without a closed form there is only the function `residual`.
+    ``parts(*arguments)`` returns (load, g0, g1), where load is σss itself if the rig gives it (`given`); `sigma` and
+    `slope` are the expressions of σss and g1. Without a closed form only the function `residual` is set.
     """
 
     affine: bool
@@ -48,12 +48,12 @@ class SteadyEquation:
 
 @cached
 def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
-    """Equation of the steady normal stress of a contact, by its index, or of a slider's contact.
+    """Equation of the steady normal stress of contact number `place`, or of a slider's contact.
 
     Raises
     ------
     NotAvailable
-        If it depends on that of another contact (see `joint_equation`), or if `place` is None for a machine.
+        If the stress depends on another contact's (see `joint_equation`), or if `place` is None for a machine.
     """
     contact = model.contact if place is None else model.contacts[place]
     sigma = contact.sigma_ss
@@ -78,7 +78,7 @@ def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
 
 @dataclass(frozen=True)
 class Bends:
-    """Places at which coupled steady normal stresses bend: each |e| of their equations is s e, with the sign s of e.
+    """Absolute values |e| in the equations of coupled steady normal stresses, written as s e with the sign s of e.
 
     Attributes
     ----------
@@ -120,14 +120,14 @@ class JointEquation:
         return found[..., :count].reshape(*found.shape[:-1], self.size, self.size), found[..., count:]
 
     def range_arrays(self, arguments: Arguments) -> tuple[Array, Array]:
-        """The same with all signs positive, for tests of overflow."""
+        """Values of A and b with all signs positive, for tests of overflow."""
         return self.arrays((*arguments, *self.bends.patterns[0]))
 
     def solve(self, arguments: Arguments) -> tuple[Array, Array]:
         """Solution σ (..., n) in Pa, and largest real eigenvalue of A (−inf if none is real); >= 1 is lock-up.
 
-        With bends the first solution that has the signs it was made with, is positive and has det(I − A) > 0, that is,
-        does not lock up; where there is none, that of the first combination.
+        With `bends`, the first combination of signs is taken whose solution has these signs, is positive and has
+        det(I − A) > 0 (no lock-up); if there is none, the solution for all signs positive.
         """
         patterns = self.bends.patterns
         sigma, gain, holds = self._one_pattern(arguments, patterns[0])
@@ -139,7 +139,7 @@ class JointEquation:
         return sigma, gain
 
     def _one_pattern(self, arguments: Arguments, signs: tuple[float, ...]) -> tuple[Array, Array, Array]:
-        """Solution and largest eigenvalue with given signs, and where they hold and the contacts slide."""
+        """Solution and largest real eigenvalue for given signs; True where signs are consistent and contacts slide."""
         matrix, right = self.arrays((*arguments, *signs))
         good = np.all(np.isfinite(matrix), axis=(-2, -1)) & np.all(np.isfinite(right), axis=-1)
         matrix = np.where(good[..., None, None], matrix, 0.0)
@@ -185,7 +185,7 @@ class CarriedEquation(JointEquation):
         return blocks
 
     def _by_stress(self, blocks: list[Array]) -> tuple[Array, Array]:
-        """Matrix Z and vector z0 of z = Z σ + z0."""
+        """Matrix Z (..., n, contacts) and column z0 (..., n, 1) of z = Z σ + z0."""
         matrix, rest, by_friction, by_normal, _, _, friction, _, offset = blocks
         right = np.concatenate([by_friction @ friction + by_normal, rest + by_friction @ offset], axis=-1)
         z = solve_all_or_nan(matrix, right)
@@ -200,7 +200,7 @@ class CarriedEquation(JointEquation):
     def carried(self, arguments: Arguments, sigmas: Sequence[Any]) -> tuple[Any, ...]:
         """Link forces and displacements z at given normal stresses (Pa).
 
-        They follow from the balances and the friction, in which no |e| occurs.
+        Signs do not matter: balances and friction contain no absolute values |e|.
         """
         return self._carried(arguments, sigmas, self.bends.patterns[0])
 
@@ -274,7 +274,7 @@ def _curved(name: str) -> NotAvailable:
 
 
 def _straightened(model: Model, unknowns: Sequence[sp.Symbol]) -> tuple[list[sp.Expr], Bends]:
-    """Laws of the steady normal stresses with s e for each |e| that depends on the unknowns."""
+    """Expressions of the steady normal stresses with s e for each |e| that depends on the unknowns; and `Bends`."""
     laws = [contact.steady_stress for contact in model.contacts]
     wanted = set(unknowns)
     found = {atom: None for law in laws for atom in sorted(law.atoms(sp.Abs), key=str) if atom.free_symbols & wanted}
@@ -348,7 +348,7 @@ def steady_stress(model: Model, arguments: Arguments, branch: int, place: int) -
 
 
 def out_of_range(model: Model, arguments: Arguments, shape: tuple[int, ...]) -> Any:
-    """True where the equations of σss overflow, so that existence of steady sliding is unknown; `shape`."""
+    """True, in `shape`, where the equations of σss overflow, so that existence of steady sliding is unknown."""
     found = np.zeros(shape, dtype=bool)
     joint = joint_equation(model)
     if joint is not None:

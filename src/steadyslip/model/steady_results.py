@@ -28,7 +28,7 @@ class SteadySliding(Displayed):
     Attributes
     ----------
     velocity : float
-        m/s, that of the drive.
+        Velocity of the drive, m/s.
     normal_stress, shear_stress, spring_stress : float
         Pa; the spring also carries the damping to the ground.
     friction : float

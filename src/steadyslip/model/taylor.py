@@ -24,12 +24,12 @@ from steadyslip.model.range import delays_of
 Index = tuple[int, ...]
 """Indices (equation, variable, ...) of a derivative, variables in rising order."""
 Entry = tuple[Index, Array, Array]
-"""Derivative: its indices, values (m,) and their rounding errors (m,)."""
+"""A derivative: its indices, its values for m rigs (m,), and rounding errors of the values (m,)."""
 EPS = float(np.finfo(float).eps)
 ROUNDING_PATTERNS = 4
-"""Number of random sign patterns with which all numbers of a rig are perturbed by one rounding, to estimate errors."""
+"""Number of perturbed copies for estimates of errors: all numbers of a rig change by ±`EPS` with random signs."""
 OPERATIONS_PER_ENTRY = 4
-"""Assumed number of consecutive operations of a derivative; each rounds by half of `EPS` at most. Chosen by trial."""
+"""Assumed number of roundings (each `EPS` at most, relative) in the value of a derivative; chosen by trial."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +49,8 @@ class System:
     function : ArrayFunction
         Array function of the expressions.
     late : tuple of (int, int, int)
-        For each late unknown, which follows another one a delay later: its row (and own place), the place of what it
-        follows, and which of the delays of the model that is.
+        For each late unknown, the value of another unknown one delay ago: its own index (also that of its equation),
+        index of the other unknown, and index of the delay in `Model.delays`.
     """
 
     model: Model
@@ -70,7 +70,7 @@ class System:
 def system(model: Model) -> System:
     """Differentiate a Model three times at steady sliding.
 
-    A late value is an unknown of its own: whatever is not linear in it stays an ordinary derivative.
+    A late value is an unknown of its own, so that equations may be nonlinear in it.
     """
     variables = [item.symbol for item in model.variables]
     balances = {contact.unknown: contact.balance for contact in model.contacts}
@@ -80,7 +80,7 @@ def system(model: Model) -> System:
     unknowns = [*variables, *balances, *model.definitions, *model.late]
     equations = [*model.rates, *balances.values()]
     equations += [definition - symbol for symbol, definition in model.definitions.items()]
-    equations += [-symbol for symbol in model.late]  # to which comes what it follows, late
+    equations += [-symbol for symbol in model.late]  # `Taylor.followed` adds the delayed unknown
     late = tuple(
         (unknowns.index(symbol), unknowns.index(base), model.delays.index(delay))
         for symbol, (base, delay) in model.late.items()
@@ -114,7 +114,7 @@ class Taylor:
     Attributes
     ----------
     gradient, gradient_error : ndarray (m, n, n)
-        Errors include rounding of the rig's own numbers.
+        Jacobian of F and its rounding errors, which include rounding of the rig's parameters.
     second, third : list of Entry
     mass : ndarray (n,)
         Ones for equations with a time derivative, zeros for the others.
@@ -131,7 +131,7 @@ class Taylor:
     delays: Array
 
     def followed(self, s: Array) -> tuple[Array, Array]:
-        """What late unknowns add to the gradient at places s (m,), exp(−s delay), and its slope with s: (m, n, n)."""
+        """Terms exp(−s delay) of late unknowns in the gradient, for s (m,), and their derivatives by s; (m, n, n)."""
         found = np.zeros((2, len(s), len(self.mass), len(self.mass)), dtype=complex)
         for row, column, which in self.system.late:
             delay = self.delays[:, which]

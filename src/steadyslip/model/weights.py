@@ -17,13 +17,13 @@ from steadyslip.model.kinematics import kinematics
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reducing import can_eliminate
 
-LEAST_WEIGHT = 1e-5  # least weight in friction, relative to ln v's, to eliminate a memory variable: its inverse
-# amplifies rounding, here by 1e5; chosen by trial
+LEAST_WEIGHT = 1e-5  # least effect on friction, relative to that of ln v, of a memory variable that is eliminated;
+# elimination amplifies rounding by the inverse, here 1e5; chosen by trial
 
 
 @dataclass(frozen=True)
 class Weights(ReadOnly):
-    """Derivatives at a contact in steady sliding, as arrays or nodes of a program.
+    """Derivatives at a contact in steady sliding, as arrays or nodes of a generated program.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Weights(ReadOnly):
 
 
 def weight_expressions(model: Model, index: int = 0) -> list[sp.Expr]:
-    """Expressions of `Weights`: direct, by slip, by unknown, stress; weights, decays and values of the memory."""
+    """Expressions in the order of `Weights.of`: direct, by_slip, by_unknown, stress, by_memory, decay, memory."""
     contact = model.contacts[index]
     v, memory = contact.velocity, [item.symbol for item in contact.memory]
     wanted = [v * derivative(contact.balance, v), *_balance_slopes(model, index), contact.sigma_ss]
@@ -116,9 +116,10 @@ def _slip_rates(model: Model) -> ArrayFunction:
 
 @cached
 def eliminable(point: OperatingPoint) -> int | tuple[int | None, ...] | None:
-    """Index of the memory variable to eliminate: the one with the largest weight in friction that can be.
+    """Index of the memory variable to eliminate: of those that can be, the one with the largest effect on friction.
 
-    None if there is none, or if its weight is too small in some rig. A tuple with one for each contact of a machine.
+    None if no variable can be eliminated, or if its effect is too small in some rig. For a machine, a tuple with one
+    index or None for each contact.
     """
     model = point.model
     if model.is_single:

@@ -1,7 +1,7 @@
 """Friction laws, contact laws, and what the author of a new law needs: parameters, units and allowed values.
 
-Laws are frozen records whose methods return SymPy expressions. They know nothing of where they are used: rigs, Models,
-files, anything that is computed of them. Names are listed in ``__init__.pyi`` and loaded on first use.
+Laws are frozen records whose methods return SymPy expressions; they do not depend on rigs, Models or files. Names are
+listed in ``__init__.pyi`` and loaded on first use.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""What a law declares its parameters with: kinds of fields, and the values that they may take."""
+"""Names with which a law declares its parameters: kinds of fields, and domains of allowed values."""
 
 from steadyslip.core.domains import Domain, acute, angle, below_one, count, nonnegative, positive, real, share, turn
 from steadyslip.core.records import option, parameter, part, parts, samples

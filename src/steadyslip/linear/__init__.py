@@ -1,6 +1,6 @@
-"""Small perturbations of steady sliding: two routes to stability, edges, formulas, transfer functions.
+"""Linear stability of steady sliding: eigenvalues, edges, formulas, transfer functions, modes.
 
-Knows nothing of motion, which knows nothing of it: the two meet in tests, and in the layers above.
+Independent of the folder `motion`; tests, and layers above both folders, compare their results.
 """
 
 from __future__ import annotations

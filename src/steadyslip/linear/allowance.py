@@ -1,8 +1,8 @@
-"""How many terms of a sum may be evaluated on the imaginary axis to count roots under delays.
+"""Limit on the number of terms evaluated on the imaginary axis to count roots under delays.
 
-Where late terms nearly outweigh what acts at once, or delays are long, one count takes seconds and a scan asks for a
-thousand of them. Inside `at_most` all counts together stop after a number of terms, the same on every computer: they
-come out as `argument.UNKNOWN`, and `CountingAllowance.spent` tells so.
+Where delayed terms are nearly as large as undelayed ones, or delays are long, one count takes seconds, and a scan needs
+a thousand. Inside `at_most` all counts together stop after a given number of terms, so that results do not depend on
+the computer: further counts return `argument.UNKNOWN`, and `CountingAllowance.spent` is True.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-_SHARE = 16  # of what is left; about the number of times that pieces of the axis are halved in one count
+_SHARE = 16  # one step may take 1/16 of the terms left; one count halves pieces of the axis about 16 times
 
 
 @dataclass
 class CountingAllowance:
-    """Terms that are left, and whether more were asked for."""
+    """Number of terms left, and True in `spent` if more were needed."""
 
     left: int
     spent: bool = False
@@ -28,7 +28,7 @@ _CURRENT: ContextVar[CountingAllowance | None] = ContextVar("allowance", default
 
 @contextmanager
 def at_most(terms: int) -> Iterator[CountingAllowance]:
-    """Allowance of so many terms, about half a microsecond each, for all that is counted inside the block."""
+    """Context manager that allows `terms` terms, about half a microsecond each, for all counts inside the block."""
     own = CountingAllowance(terms)
     token = _CURRENT.set(own)
     try:
@@ -38,13 +38,13 @@ def at_most(terms: int) -> Iterator[CountingAllowance]:
 
 
 def at_a_time(most: int) -> int:
-    """Number of terms that one step of a count may take, `most` at most, so that one count does not take all."""
+    """Number of terms that one step of a count may take: at most `most`, and a share of those left."""
     own = _CURRENT.get()
     return most if own is None else min(most, own.left // _SHARE)
 
 
 def may_take(terms: int) -> bool:
-    """True, and so many terms fewer are left, if the current allowance has them; always True without one."""
+    """Take `terms` from the current allowance; False if it has fewer; always True outside `at_most`."""
     own = _CURRENT.get()
     if own is None:
         return True

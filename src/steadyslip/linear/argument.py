@@ -23,8 +23,8 @@ _NEAR = 1e-13  # relative length at which a piece is not cut further (rounding):
 
 @dataclass(frozen=True, eq=False)
 class _Pieces:
-    """Stretches of the imaginary axis, of one rig of several each: frequencies of both ends, what all terms are there
-    without e^(−sh), (2, m, pieces), and what the sum is."""
+    """Pieces of the imaginary axis: index of the rig (pieces,), and at both ends the frequencies (2, pieces), the terms
+    without their factors e^(−sh), (2, m, pieces), and their sum with these factors (2, pieces)."""
 
     row: NDArray[np.int64]
     omega: Array
@@ -41,14 +41,14 @@ class _Pieces:
 
 @dataclass(frozen=True, eq=False)
 class SumsOnAxis:
-    """Sums (rows, m, n+1) with delays (rows, m) on the positive imaginary axis, from zero to where no root can be.
+    """Sums (rows, m, n+1) with delays (rows, m) on the positive imaginary axis, from zero to an upper bound of roots.
 
-    `sets` (m, d) tells which delays act in each term; the highest power must not be able to vanish (`neutral`).
+    `sets` (m, d) is True where a delay acts in a term; the highest power must not be able to vanish (`neutral`).
 
-    The axis is cut until on each piece either one term is larger than all others together, so that the sum turns as
-    that one does but for less than a quarter at either end, whatever the delays; or the sum cannot wind around zero
-    unseen: its length between two places is at most their distance times the largest slope, and where that is less
-    than the sum of the sizes at both, the chord and the sum go around zero on the same side.
+    The axis is cut until the change of argument on each piece is known. Either one term is larger than all others
+    together: the argument of the sum then follows that of the term, with less than π/2 of difference at either end,
+    whatever the delays. Or the sum cannot wind around zero on the piece: its path is at most as long as the piece times
+    the largest slope; if that is less than the sum of the sizes at both ends, path and chord pass zero on one side.
     """
 
     c: Array
@@ -80,9 +80,9 @@ class SumsOnAxis:
         return _Pieces(np.tile(old.row, 2), *both)
 
     def units(self, pieces: _Pieces) -> Iterator[tuple[Array, Array, Array]]:
-        """Two units, (2, pieces), in which terms are compared: 1, and the highest power of ω, where lower ones are few.
+        """Yield two units (2, pieces) in which terms are compared: 1, and the highest power of ω, for high frequencies.
 
-        With each unit come bounds, (pieces,), of the slopes of all terms together, without their delays and by these.
+        With each unit, bounds (pieces,) of the slope of the sum: by the polynomials, and by the delays.
         """
         size, (_, top) = np.abs(self.c), highest(self.c)
         power, (low, high) = np.arange(size.shape[-1]), pieces.omega
@@ -97,9 +97,9 @@ class SumsOnAxis:
         yield pieces.omega ** top[pieces.row], steep, evaluate(late[pieces.row], inverse)
 
     def resolved_pieces(self) -> Iterator[tuple[_Pieces, NDArray[np.int64]]]:
-        """Pieces on which the change of argument is known, with the index of the dominant term, −1 where none is.
+        """Yield pieces on which the change of argument is known, with the index of the dominant term, −1 if none is.
 
-        For a rig that needs too many pieces, or more than are allowed, the last ones come with `UNKNOWN` instead.
+        For a rig that needs more pieces than are allowed, the unresolved ones have `UNKNOWN` instead of the index.
         """
         pieces = self.whole()
         while pieces.row.size:
@@ -137,17 +137,17 @@ class SumsOnAxis:
 
 @quietly
 def count_by_argument(c: Array, h: Array, sets: Sets) -> NDArray[np.int64]:
-    """Number of roots right of the axis of sums c (rows, m, n+1) with delays h (rows, m), whose terms `sets` tells.
+    """Number of roots right of the axis of sums c (rows, m, n+1) with delays h (rows, m), combined as in `sets`.
 
     `UNKNOWN` where counting takes too long. By the argument principle the number is n/2 minus the change of argument
-    along the positive imaginary axis over π. Beyond the bound of frequencies the argument is that of the highest power
-    to less than π/2, which on the way to infinite Re s becomes that of its term without delay.
+    along the positive imaginary axis over π. Beyond the bound of frequencies the argument differs by less than π/2 from
+    that of the highest power, which for Re s to infinity becomes that of its term without delay.
     """
     coefficients, top = highest(c)
     end = bound_on_axis(c, sets)
     counted = np.flatnonzero(
         leads(c) | (end * np.max(h, axis=-1) < _MOST // len(c))
-    )  # else pieces of a turn are too many
+    )  # other rigs would need too many pieces
     found = np.full(len(c), np.nan)
     c, h, end, top = c[counted], h[counted], end[counted], top[counted]
     axis = SumsOnAxis(c, h, sets)

@@ -1,4 +1,4 @@
-"""`boundary` and `margins`: edges of stability in one parameter, and the distance of each parameter to its nearest."""
+"""`boundary` and `margins`: edges of stability in one parameter; distance of each parameter from its nearest edge."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ from steadyslip.model.range import require_digits, require_range
 _TOO_MANY = "roots under the delays are too many there to be counted; shorten the delays"
 _ERRORS = "the response is too short, too coarse or too uncertain there; analyze says which"
 _TERMS = 12_000_000  # evaluated on the imaginary axis for all edges together: some five seconds
-REMOTE = 100  # edges further than this factor from a value come after all others: nobody changes a rig as much
-_TIED = 6  # digits to which distances are compared, no closer than 1e-6: pages know edges to twelve
+REMOTE = 100  # factor between value and edge above which the edge ranks last: nobody changes a rig as much
+_TIED = 6  # digits to which distances are compared; pages compute edges to twelve digits
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ class Margin(Displayed):
     ----------
     parameter, unit : str
     value : float
-        The rig's own.
+        Value in the rig, SI unit.
     edge : Boundary or None
-        The nearest by `steadyslip.linear.nearness`; None if stability does not change in the range searched.
+        Nearest edge by `steadyslip.linear.nearness`; None if stability does not change in the range searched.
     edges : tuple of Boundary
-        All in the range searched.
+        All edges in the range searched.
     absolute : float
         Signed distance edge − value; NaN without edge.
     relative : float
@@ -76,7 +76,7 @@ class Margin(Displayed):
 
     @property
     def about(self) -> tuple[Boundary, ...]:
-        """The edges next to the value, below and above it, nearest first; a remote one only if it is the nearest."""
+        """Edges next to the value, below and above it, nearest first; a remote edge only if it is the nearest."""
         found = edges_about(self.value, self.edges)
         return found[:1] + tuple(edge for edge in found[1:] if not self.is_remote(edge))
 
@@ -101,13 +101,13 @@ def boundary(
         shares, six decades to each side of other values and of their natural size, and both signs where they are
         allowed. The edges in a range are the same whatever the range.
     branch : int
-        Which steady sliding, by rising normal stress, where a rig has several.
+        Index of the steady state, by rising normal stress, if there are several.
 
     Returns
     -------
     tuple of Boundary
-        By rising value; empty if stability does not change in the range. Where that is not known, as roots under long
-        delays may be too many to be counted, a `linear.UndecidedWarning` says so.
+        By rising value; empty if stability does not change in the range. A `linear.UndecidedWarning` names parts of
+        the range in which edges are not known, because roots under long delays are too many to be counted.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def _matrix_search(rig: Machine, name: str) -> MatrixSearch | MeasuredSearch:
 
 
 def _unknown(rig: Rig, search: Search | MatrixSearch | MeasuredSearch, low: float, high: float) -> str:
-    """Name of a parameter and where between `low` and `high` its edges are not known; empty if they are."""
+    """Text that names the parameter and the parts of `low` to `high` in which edges are not known; empty if none."""
     if search.hides:
         return f"{search.name} near some values"
     first, last = search.decided
@@ -169,7 +169,7 @@ def _unknown(rig: Rig, search: Search | MatrixSearch | MeasuredSearch, low: floa
 def _where(
     rig: Rig, search: Search | MatrixSearch | MeasuredSearch, gap: tuple[float, float], low: float, high: float
 ) -> str:
-    """Words for a part of the range from `low` to `high`."""
+    """Text for a part `gap` of the range from `low` to `high`: "below 3 Pa"."""
     first, last = (format_quantity(end, search.role.unit, area=rig.area_of(search.name)) for end in gap)
     if gap[0] <= low and gap[1] < high:
         return f"below {last}"
@@ -186,9 +186,9 @@ def _require_answers(rig: Rig, branch: int) -> None:
 def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
     """Distance of every parameter to its nearest edge of stability, the most critical first.
 
-    Without those whose edges take too long to find, as delays may make it, or a parameter that changes a whole
-    structure: all together are looked for in some ten seconds. `boundary` takes its time for one parameter; `analyze`
-    names those that are missing.
+    Parameters whose edges take too long to find are left out (with delays, or if a parameter changes a whole
+    structure): the searches together take at most some ten seconds. `boundary` has no such limit; `analyze` names the
+    parameters that are missing.
 
     Raises
     ------
@@ -206,10 +206,10 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
 
 
 def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], tuple[str, ...]]:
-    """What `margins` gives, and the names of the parameters whose edges took too long to find.
+    """Result of `margins`, and the names of the parameters whose edges took too long to find.
 
-    Of a parameter whose edges are known in a part of the range only, the margin tells that part as `searched`; it is
-    among those missing, with the part in words, if its nearest edge may lie beyond.
+    If edges are known in a part of the range only, that part is `searched` of the margin; the parameter is also listed
+    as missing, with the other part in words, if its nearest edge may lie there.
     """
     if not by_matrices(rig):
         _require_answers(rig, branch)
@@ -222,7 +222,7 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
         and (address.value != 0 or not address.role.structural or name in present or name in zeros)
     ]
     found, cut, share, left = [], [], 0, _TERMS
-    while asked and left // len(asked) > share:  # those that took too long again, with what the others did not need
+    while asked and left // len(asked) > share:  # repeat slow searches with the terms that others did not need
         missing, share = [], left // len(asked)
         for name, address in asked:
             with at_most(share) as allowance:
@@ -238,7 +238,7 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
             next_to = [*cut_off, *(() if own.edge is None else (own.edge.value,))]
             if ends_about(search.value, next_to, own.unit)[:1] in [(end,) for end in cut_off]:
                 cut.append(_unknown(rig, search, low, high))
-                if not isinstance(search, MeasuredSearch):  # whose edges are told beside what errors leave open
+                if not isinstance(search, MeasuredSearch):  # measured structures report edges and gaps together
                     continue
             found.append(own)
         asked = missing
@@ -246,7 +246,7 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
 
 
 def _zero_dampings(rig: Rig) -> tuple[str, ...]:
-    """Dampings of a machine that are zero but may be given; none of one that nothing damps: the least decides there."""
+    """Names of a machine's dampings that are 0 but may be set; none if it is undamped: any damping decides then."""
     found = [name for name, one in rig.parameters().items() if name.endswith(".damping") and one.value == 0]
     if not found or by_matrices(rig) or is_undamped(operating_point(rig)):
         return ()
@@ -271,9 +271,9 @@ def _margin(name: str, unit: str, value: float, edges: tuple[Boundary, ...], sea
 
 
 def _urgency(margin: Margin) -> tuple[bool, float]:
-    """Sorting key: `doublings` to the edge, remote ones last; values of zero after others that have an edge.
+    """Sorting key: `doublings` to the edge, remote edges last; then values of zero; then parameters without edge.
 
-    Distances that differ by rounding only are equal: parameters then stay in the order of the rig.
+    Distances that differ by rounding only give equal keys, so that parameters stay in the order of the rig.
     """
     if margin.edge is None:
         return True, np.inf
@@ -306,6 +306,6 @@ def _checked_range(name: str, role: Parameter, between: Sequence[Any]) -> tuple[
 
 
 def oscillatory_edge(distances: Sequence[Margin]) -> Boundary | None:
-    """The nearest edge at which oscillations begin, of the parameters of a rig, nearest first; None without one."""
+    """First edge, in margins sorted nearest first, at which oscillations begin; None if there is none."""
     edges = [one.edge for one in distances if one.edge is not None]
     return next((edge for edge in edges if edge.kind == "oscillatory" and edge.stable != "neither"), None)

@@ -1,9 +1,9 @@
 """Edges of rigs that nothing damps: from "no root grows" to "a root grows" (theory 13).
 
-Without damping and without memory in the friction the characteristic polynomial has even powers of s only. Its roots
-in s² are real and negative where every disturbance oscillates for ever; where two of them meet and part as a complex
+Without damping and without memory of friction the characteristic polynomial has even powers of s only. If its roots in
+s² are all real and negative, every disturbance oscillates for ever. Where two roots in s² meet and become a complex
 pair, two oscillations couple and one grows: at the edge the polynomial has a double imaginary root, and the growth rate
-beyond it rises as the square root of the distance, from zero.
+beyond the edge rises from zero with the square root of the distance.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from steadyslip.linear.status import ABSENT, UNKNOWN, status
 from steadyslip.linear.undamped import grows, is_undamped, squares
 from steadyslip.machine.rig import Rig
 
-QUIET, GROWS = 10, 11  # beside the values of `status`
-ROUNDS = 4  # of following dips of the gap between two roots: each narrows it 16 times
+QUIET, GROWS = 10, 11  # no root grows, a root grows; distinct from the values of `status`
+ROUNDS = 4  # refinements of a minimum of the gap between two roots; each narrows its bracket
 
 
 def gaps(u: ComplexArray) -> Array:
-    """Least distance of two of the sorted squares (..., n) of roots, relative to their size, (...); inf with one."""
+    """Least distance between neighbours of sorted squares of roots (..., n), relative to their size; inf if n < 2."""
     apart = np.abs(u[..., 1:] - u[..., :-1]) / np.abs(u[..., 1:] + u[..., :-1])
     return np.asarray(np.min(np.where(np.isnan(apart), np.inf, apart), axis=-1, initial=np.inf))
 
 
 def near_couplings(grid: Array, gaps_at: Callable[[Array], Array]) -> Array:
-    """Values between samples at which two squares of roots come closest, where a narrow window may lie."""
+    """Parameter values between samples at which two squares of roots come closest: a narrow window may lie there."""
     gap = gaps_at(grid)
     dips = np.flatnonzero((gap[1:-1] <= gap[:-2]) & (gap[1:-1] <= gap[2:]) & np.isfinite(gap[1:-1])) + 1
     low, high, found = grid[dips - 1], grid[dips + 1], [np.empty(0)]
@@ -62,7 +62,7 @@ class UndampedSearch(Search):
             kind = self._kinds_of_growth(x)
             at = np.flatnonzero((kind[1:] != kind[:-1]) & (kind[1:] != UNKNOWN) & (kind[:-1] != UNKNOWN))
             found = [self._edge(x[i], x[i + 1], kind[i], kind[i + 1]) for i in at]
-        zero = self.role.domain.low == 0  # the end of the domain, no edge
+        zero = self.role.domain.low == 0  # 0 is the end of the domain then, not an edge
         return tuple(one for one in found if low <= one.value <= high and not (zero and one.bracket[0] == 0))
 
     def _kinds_of_growth(self, x: Array) -> NDArray[np.int64]:
@@ -73,8 +73,8 @@ class UndampedSearch(Search):
         return np.where(known, np.where(grows(point), GROWS, QUIET), found)
 
     def _edge(self, low: float, high: float, below: int, above: int) -> Boundary:
-        absent = low if below == ABSENT else high  # a sample, where absence is no matter of rounding
-        for _ in range(int(60 / np.log2(SPLIT))):  # bits of a float, and some to spare
+        absent = low if below == ABSENT else high  # at a sample, absence is not due to rounding
+        for _ in range(int(60 / np.log2(SPLIT))):  # 60: more than the bits of a float
             x = np.linspace(low, high, SPLIT + 1)
             at = max(1, int(np.argmax(self._kinds_of_growth(x) != below)))
             low, high = float(x[at - 1]), float(x[at])

@@ -1,7 +1,7 @@
 """Routh array of polynomials, and the k at which p + k q has a root iβ on the imaginary axis (theory 3).
 
 Plain arithmetic: a polynomial is a list of coefficients, lowest power first, that are numbers, arrays or nodes of a
-program. Arrays of rigs (`polynomials`) and pages (`steadyslip.explorer`) are judged by these lines.
+generated program. Arrays of rigs (`polynomials`) and pages (`steadyslip.explorer`) use the same functions.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import numpy as np
 
 from steadyslip.core.expressions import Choose
 
-ROUNDING = 8 * float(np.finfo(float).eps)  # share of two terms below which what is left of them is none
-APART = 1e6  # factor between the values of a parameter at which `linear_split` is told a polynomial
-_LEFT = 1e-13  # share of its terms that rounding leaves of a difference that is zero
-_LINEAR = 1e-10  # share of a coefficient that rounding alone can make
+ROUNDING = 8 * float(np.finfo(float).eps)  # a difference smaller than this share of its terms counts as 0
+APART = 1e6  # factor between the parameter values at which `linear_split` takes the polynomial
+_LEFT = 1e-13  # relative size up to which a difference of coefficients is rounding error
+_LINEAR = 1e-10  # relative deviation from linearity that rounding alone can cause
 Polynomial = Sequence[Any]
 
 
@@ -35,7 +35,8 @@ def routh(c: Polynomial) -> list[Any]:
 def is_ill_posed(c: Polynomial, spare: Any) -> Any:
     """True where the highest coefficient of a polynomial that is not 0 is negative, or more than `spare` are 0.
 
-    `spare` is 1 without mass where the equations have its coefficient, which is 0 then (`model.posed.spare_powers`).
+    `spare` is the number of highest coefficients that may be 0, such as that of a mass of 0; see
+    `model.posed.spare_powers`.
     """
     found: Any = (c[-1] < 0) | ((c[-1] <= 0) & (spare < 1))
     gone: Any = abs(c[-1]) <= 0
@@ -66,7 +67,7 @@ def axis_polynomial(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> 
     Parameters
     ----------
     choose : callable
-        ``choose(condition, value, other)``; that of a program, where coefficients are its nodes.
+        Function ``choose(condition, value, other)``; for nodes of a generated program, the program's own.
     """
     (pe, po), (qe, qo) = even_odd(p), even_odd(q)
     first, second = product(po, qe), product(pe, qo)
@@ -74,7 +75,7 @@ def axis_polynomial(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> 
     for i in range(max(len(first), len(second))):
         one, other = (part[i] if i < len(part) else 0.0 for part in (first, second))
         left = one - other
-        # what is left of an exact cancellation is not a coefficient
+        # rounding error of an exact cancellation is not a coefficient
         found.append(choose(abs(left) < ROUNDING * (abs(one) + abs(other)), 0.0, left))
     return found
 
@@ -88,7 +89,7 @@ def stiffness_on_axis(p: Polynomial, q: Polynomial, square: Any) -> Any:
 def real_edges(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> tuple[Any, Any]:
     """k at which a root of p + k q is zero, and k at which the highest coefficient vanishes (a root is infinite).
 
-    The highest is that of the highest power which p or q has.
+    The highest coefficient is that of the highest power present in p or q.
     """
     top = -p[0] / q[0]
     for one, other in zip(p[1:], q[1:], strict=True):
@@ -105,7 +106,7 @@ def linear_split(
     straight: Any = True
 
     def beyond(difference: Any, of: Any) -> Any:
-        """Without what rounding alone leaves of nothing, which would be an edge at a value of 1e-20."""
+        """Difference, or 0 if it is rounding error, which would cause a spurious edge at a value of 1e-20."""
         return choose(abs(difference) <= _LEFT * abs(of), 0.0, difference)
 
     for first, middle, last in zip(low, own, high, strict=True):
@@ -119,21 +120,22 @@ def linear_split(
 
 
 def is_hurwitz(c: Polynomial, choose: Choose, spare: int) -> Any:
-    """True if all roots lie left of the axis and the highest coefficient, but for `spare` that may be 0, is positive.
+    """True if all roots lie left of the axis and the highest coefficient is positive; `spare` highest may be 0.
 
-    For one rig: of arrays see `polynomials.is_hurwitz`, which also heeds coefficients that lie a hundred decades apart.
+    For one rig. For arrays see `polynomials.is_hurwitz`, which also handles coefficients a hundred decades apart.
     """
     return judged(c, choose, spare, spare)[0]
 
 
 def judged(c: Polynomial, choose: Choose, spare: Any, most: int) -> tuple[Any, list[Any]]:
-    """`is_hurwitz`, and factors of three functions, one of which changes sign wherever that changes.
+    """Result of `is_hurwitz`, and factors of three functions, one of which changes sign wherever that result changes.
 
-    `spare` of the highest coefficients may be 0, which is never more than `most`.
+    `spare` of the highest coefficients may be 0; `spare` is at most `most`.
 
-    The three are the lowest coefficient (one root is zero), the highest (one is infinite), and the last but one
-    determinant of Hurwitz, which is the product of all sums of two roots but for a factor (Orlando; two are ±iβ). The
-    third has several factors, entries of the Routh array. Where highest coefficients are 0, the next counts as such.
+    The three functions are the lowest coefficient (zero: a root is zero), the highest (zero: a root is infinite), and
+    the last but one Hurwitz determinant (zero: two roots are ±iβ), by Orlando proportional to the product of all sums
+    of two roots. The determinant has several factors, entries of the Routh array. Where highest coefficients are 0, the
+    next one takes their place.
     """
     largest: Any = 0.0
     for one in c:
@@ -161,7 +163,7 @@ def _all_positive(values: Polynomial) -> Any:
 
 
 def share_left(terms: Sequence[Any], choose: Choose = np.where) -> Any:
-    """Size of the sum of terms over the sum of their sizes; zero without terms."""
+    """Absolute value of the sum of terms over the sum of their absolute values; 0 without terms."""
     total, sizes = 0.0, 0.0
     for term in terms:
         total, sizes = total + term, sizes + abs(term)

@@ -76,15 +76,15 @@ def squared_frequency(
 def stable_interval(
     numerator: Num, denominator: Num, mu_b2: Num, mu_b3: Num, a2: Num, a3: Num, choose: Choose = np.where
 ) -> tuple[Num, Num]:
-    """The one interval of k > 0 in which all Hurwitz conditions hold.
+    """Interval of k > 0 (Pa/m) in which all Hurwitz conditions are satisfied.
 
-    Conditions: a3 >= 0, a2 > 0 (no k in them), D k > N, and a0 > 0, that is (1 + μB2) k > −μB3. Without
-    inertia (a3 = 0) they are the same, D k > N being a1 > 0.
+    Conditions: a3 >= 0, a2 > 0 (no k in them), D k > N, and a0 > 0, that is (1 + μB2) k > −μB3. They are valid without
+    inertia (a3 = 0) too: D k > N is a1 > 0 then.
 
     Parameters
     ----------
     choose : callable
-        ``choose(condition, value, other)``; that of a program, where arguments are its nodes.
+        Function ``choose(condition, value, other)``; for nodes of a generated program, the program's own.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def stable_interval(
 
 
 def without_gain(low: Num, high: Num, gain: Num, choose: Choose = np.where) -> tuple[Num, Num]:
-    """The interval of the spring's own stiffness, from that of the total with a controller's gain."""
+    """Interval of the spring's own stiffness, from the interval of its sum with a controller's gain."""
     if choose is np.where and not np.ndim(gain) and gain == 0:
         return low, high
     left, most = low - gain, high - gain
@@ -109,7 +109,7 @@ def without_gain(low: Num, high: Num, gain: Num, choose: Choose = np.where) -> t
 
 
 def positive(value: Num, choose: Choose = np.where) -> Num:
-    """Where `value` > 0; of arrays plain True if everywhere, found in one pass: masks cost only where needed."""
+    """`value` > 0; for an array that is positive everywhere plain True, which saves the cost of masks."""
     if choose is not np.where:
         return value > 0
     if np.ndim(value) == 0:
@@ -125,7 +125,7 @@ def unless(valid: Num, value: Num, choose: Choose = np.where) -> Num:
 
 
 def _half_line(low: Num, high: Num, slope: Num, right: Num, valid: Num, choose: Choose) -> tuple[Num, Num, Num]:
-    """Intersect (low, high) with slope·k > right; the common case of one sign throughout first."""
+    """Intersect (low, high) with slope·k > right; fast if all slopes are positive."""
     with np.errstate(divide="ignore", invalid="ignore"):
         if positive(slope, choose) is True:
             return (low if np.ndim(right) == 0 and right == 0 else np.maximum(low, right / slope)), high, valid

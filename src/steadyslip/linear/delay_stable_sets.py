@@ -1,11 +1,11 @@
 """Exact stable sets of machines with delay: of the delay itself, and of a parameter θ that enters linearly.
 
-Of θ in P(s) + θ Q(s), both with delays, edges are θ = −P(iω)/Q(iω) where that is real, as without delay; ω follows from
-a function that oscillates, so that there are ever more of them and the set is one of windows (theory 4, 10). Its zeros
-are enclosed (`waves`), so that none is missed; between two neighbours the count of unstable roots is constant.
+For θ in P(s) + θ Q(s), both with delays, edges are θ = −P(iω)/Q(iω) where that is real, as without delay. The ω are
+zeros of a function that oscillates, so that the stable set consists of many windows (theory 4, 10). The zeros are
+enclosed (`waves`), so that none is missed; between two neighbouring edges the number of unstable roots is constant.
 
-Of one delay θ among several, A(s) + B(s) exp(−sθ), roots are on the axis only at the ω with |A(iω)| = |B(iω)|, enclosed
-in the same way, and cross to the right where |A| − |B| rises with ω.
+For one delay θ among several, A(s) + B(s) exp(−sθ), roots are on the axis only at the ω with |A(iω)| = |B(iω)|, which
+are enclosed by `waves` as well; roots cross to the right where |A| − |B| rises with ω.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from steadyslip.linear.waves import difference_of_squares, im_of_product
 _TURNS = 100  # periods of an oscillation during the longest delay beyond which windows are not searched
 _STEPS = 8  # values of θ per decade at which the fastest possible oscillation is estimated
 _FEW = 8  # largest number of growing roots at which a window may be near (as in `search`)
-_TOWARDS = 10.0 ** -np.arange(1, 9)  # distances from an edge, relative to it, at which the equations become ill-posed
-_CLOSE = 1e-3  # relative distance from an edge within which roots must have been counted for it to be the next
-_HALVINGS = 50  # of a bracket of an eighth of a decade, down to rounding
-_SPARE = 0.1  # share of the undelayed term's lead over the others that is added to each weight, so that none is zero
-_TIMES_CUT, _PIECES = 3, 4  # how often, and in how many, pieces between two values of θ are cut that have no bound
-_ON_AXIS = 1e-3  # relative error of a root of a polynomial that counts as real: that of a double one is some 1e-8
-_MANY = 20_000  # such periods of the rig itself beyond which the search is refused
-_ROUNDING, _CORNER = 1e-12, 1e-8  # relative distance of values of θ that rounding may make; at infinite s by products
-_TOUCHED = 1e-7  # relative width of a window that rounding makes where a root only touches the axis: some sqrt(eps)
-_PLAIN = 1e-6  # share of ds/dθ across the axis below which a root may run along it, so that roots are counted anew
+_TOWARDS = 10.0 ** -np.arange(1, 9)  # relative distances of samples from a value at which equations become ill-posed
+_CLOSE = 1e-3  # roots must be known this close (relative) to an ill-posed value for no other edge to lie between
+_HALVINGS = 50  # bisections of a bracket of an eighth of a decade, down to rounding
+_SPARE = 0.1  # share of the undelayed term's excess over the others that is added to each weight, so that none is zero
+_TIMES_CUT, _PIECES = 3, 4  # number of times that an interval of θ without bound is cut, and pieces of each cut
+_ON_AXIS = 1e-3  # relative imaginary part up to which a root of a polynomial counts as real; a double one has 1e-8
+_MANY = 20_000  # periods during the longest delay, at the rig's own value, above which the search is refused
+_ROUNDING, _CORNER = 1e-12, 1e-8  # relative rounding error of edges θ; the second at infinite s, found by products
+_TOUCHED = 1e-7  # relative width up to which a window is rounding error of a root that touches the axis: ~sqrt(eps)
+_PLAIN = 1e-6  # |Re ds/dθ| over |ds/dθ| below which a root may move along the axis, so that roots are counted anew
 
 
 def empty_set() -> StableSet:
@@ -64,8 +64,8 @@ def delay_set(p: Array, q: Array, spare: int) -> StableSet:
 def delay_set_among(c: Array, h: Array, sets: Sets, late: NDArray[np.bool_], spare: int) -> StableSet | None:
     """Stable set of one delay θ > 0 (s) of a rig with several; None where its edges are too many to separate.
 
-    `c` (m, n+1) are the coefficients of Σ p_j(s) exp(−s h_j), `h` (m,) the delays without θ; `sets` (m, d) tells
-    which delays act in each term, `late` (m,) in which θ does. The `spare` highest powers may be missing.
+    `c` (m, n+1) are the coefficients of Σ p_j(s) exp(−s h_j), `h` (m,) the delays without θ; `sets` (m, d) is True
+    where a delay acts in a term, `late` (m,) where θ does. The `spare` highest powers may be missing.
     """
     (scaled,), (others,), (rate,) = nondimensional(c[None], h[None])
     top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
@@ -100,10 +100,10 @@ def _set_of_cells(edges: Array, frequencies: Array, stable: NDArray[np.bool_]) -
 def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, sets: Sets, spare: int) -> StableSet | None:
     """Stable set of θ in P + θ Q between `low` and `high`; the rig's own value is θ = 1.
 
-    P and Q are (m, n+1), with delays h (m,), whose terms `sets` (m, d) tells; the `spare` highest powers may be
-    missing. The set is known within `searched`, which ends where there may be windows without end, at the same places
-    whatever the range. An interval that begins at an uncut `low` is given as from zero, one that ends at an uncut
-    `high` as to infinity. None where the delay is so long for the rig itself that its windows are too many.
+    P and Q are (m, n+1), with delays h (m,), combined as in `sets` (m, d); the `spare` highest powers may be missing.
+    The set is known within `searched`, which ends before values with infinitely many windows, whatever the range. An
+    interval that begins at `low` itself is extended to zero, one that ends at `high` itself to infinity. None where the
+    delay is so long for the rig's own value that windows are too many.
     """
     theta = 10 ** (np.arange(np.floor(_STEPS * np.log10(low)), np.ceil(_STEPS * np.log10(high)) + 1) / _STEPS)
     low, high = float(theta[0]), float(theta[-1])
@@ -136,7 +136,7 @@ def _ill_posed(p: Array, q: Array, sets: Sets, spare: int, theta: Array) -> NDAr
 
 
 def _edges_of_ill_posed(p: Array, q: Array, sets: Sets, spare: int, theta: Array) -> Array:
-    """Values between those of `theta` at which the equations become ill-posed; corners of P to the last digit."""
+    """Values within the range of `theta` at which the equations become ill-posed; those from `corners` are exact."""
     top = int(np.flatnonzero(np.any((p != 0) | (q != 0), axis=0))[-1])
     tops = -(p[:, top] @ corners(sets)) / (q[:, top] @ corners(sets))
     tops = np.unique(tops[(tops > theta[0]) & (tops < theta[-1])])
@@ -158,10 +158,10 @@ def _known(
 ) -> tuple[float, float]:
     """Lowest and highest θ, around 1, up to which windows are known.
 
-    They are at samples `known`, whose oscillations are slow enough to be followed. At others roots are counted: many of
-    them grow, so that nothing near is stable; or an edge at which the equations become ill-posed is so close, with as
-    many roots as at the sample before, that it is the next. With several delays counts there take too long, and it is
-    taken to be the next within the distance of two samples.
+    Windows are known at samples `known`, whose oscillations are slow enough to be followed. At other samples roots are
+    counted. The sample is accepted if many roots grow, so that nothing nearby is stable; or if a value at which the
+    equations become ill-posed is so close, with as many roots as at the sample before, that no other edge can lie
+    between. With several delays counts take too long there, and this is assumed within the distance of two samples.
     """
     ends, close = [], _CLOSE if len(h) <= 2 else 10 ** (1 / _STEPS) - 1
     for order in (np.arange(len(theta))[theta >= 1], np.arange(len(theta))[theta <= 1][::-1]):
@@ -190,8 +190,8 @@ def _windows(
         return None
     theta, beta = candidates
     ends = np.concatenate([[low], theta, [high]])
-    probes = np.sqrt(ends[:-1]) * np.sqrt(ends[1:])  # between two neighbours nothing crosses the axis
-    count = _count_each if len(h) <= 2 else _count_by_crossings  # with one delay a count takes no time
+    probes = np.sqrt(ends[:-1]) * np.sqrt(ends[1:])  # between two neighbours no root crosses the axis
+    count = _count_each if len(h) <= 2 else _count_by_crossings  # with one delay counts are fast
     well_posed = ~is_ill_posed(columns(p[0] + probes[:, None] * q[0]), spare)
     right = count(p, q, h, sets, theta, beta, probes)
     if np.any(right == UNKNOWN):
@@ -237,15 +237,15 @@ def _count_by_crossings(
 
 
 def _frequency_bound(p: Array, q: Array, sets: Sets, theta: Array) -> Array:
-    """Upper bound of frequencies of roots on the axis, for each θ; inf where there is none."""
+    """Upper bound of frequencies of roots on the axis, for each θ; inf where no bound is known."""
     return _bound_of_terms(p + theta[:, None, None] * q, sets)
 
 
 def _largest_between(p: Array, q: Array, sets: Sets, theta: Array) -> float:
-    """Upper bound of frequencies of roots on the axis between the first and the last θ, of pieces that have one.
+    """Upper bound of frequencies of roots on the axis between the first and the last θ, over intervals with a bound.
 
-    Between two samples a pair of frequencies may appear at which terms are equal in size, far above those at both. What
-    θ Q changes within a piece is therefore one more term for each part of Q, with a phase of its own.
+    Between two samples, a pair of frequencies may appear at which terms are equal in size, far above those at the
+    samples. The change of θ Q within an interval therefore counts as one more term of arbitrary phase per part of Q.
     """
     parts = np.any(q != 0, axis=-1)
     own = np.eye(len(sets) + np.sum(parts), dtype=bool)[:, len(sets) :]
@@ -272,8 +272,8 @@ def _bound_of_terms(c: Array, sets: Sets) -> Array:
 def _last_crossing(c: Array) -> Array:
     """Frequency (rows,) beyond which at iω the term without delay is larger than all others, for c (rows, m, n+1).
 
-    Of its highest power it must be (`leads`). By Cauchy and Schwarz (Σ|p_j|)² <= Σ w_j Σ|p_j|²/w_j, exact for two terms
-    and, with the highest coefficients as w_j, nearly so at high frequency.
+    For the highest power it must be larger (`leads`). Cauchy and Schwarz: (Σ|p_j|)² <= Σ w_j Σ|p_j|²/w_j, exact for two
+    terms; with the highest coefficients as w_j nearly exact at high frequency.
     """
     sizes = np.abs(highest(c)[0])
     weights = sizes[:, 1:] + _SPARE * (sizes[:, :1] - np.sum(sizes[:, 1:], axis=-1, keepdims=True))
@@ -289,7 +289,7 @@ def _candidates(
 ) -> tuple[Array, Array] | None:
     """Values of θ at which a root may be on the axis, rising, and its frequency: 0 at s = 0, inf at infinite s.
 
-    The last are those at which the equations become `ill_posed`.
+    Roots are at infinite s where the equations become `ill_posed`.
     """
     zeros = im_of_product(p, q, h).zeros(fast) if fast else (np.empty(0),)
     if zeros is None:

@@ -23,11 +23,11 @@ from steadyslip.model.equations import Contact
 from steadyslip.model.linearisation import characteristic_coefficients
 
 LONGEST = 4.0
-"""Seconds for each of two simplifications; what takes longer is left as it stands."""
+"""Time limit (s) of each of two simplifications; an expression that takes longer is not simplified."""
 LEGIBLE, SHORT = 60, 3
-"""Operations of a formula that is read in one line, and of an ingredient that needs no letter."""
+"""Most operations of a formula that is written as one equation, and of a part that is written without a letter."""
 LARGEST, LONG = 4, 400
-"""Degree of the characteristic polynomial up to which its condition is written, and operations beyond which not."""
+"""Highest degree of the characteristic polynomial, and most operations of a formula, for which it is written."""
 _LETTERS = {"mu": "mu_ss", "f1": "f_1"} | {f"B{i}": f"B_{i}" for i in range(4)}
 MU_SS = sp.Symbol("mu_ss", real=True)
 MEANINGS = {
@@ -42,7 +42,7 @@ MEANINGS = {
     "B_2": ("1", "rise of normal stress with the stress of the spring"),
     "B_3": ("Pa/m", "rise of normal stress with its displacement"),
 }
-"""SI unit and meaning of the letters of formulas that are not those of the equations."""
+"""SI unit and meaning of letters that occur in formulas but not in the equations of a Model."""
 
 
 @checked()
@@ -88,7 +88,7 @@ def formula(rig: Slider | Machine, along: str | None = None) -> sp.Eq:
 
 
 def _name(rig: Slider | Machine, along: str | None) -> str:
-    """Dotted name of the parameter `along`; by default a slider's stiffness, or a machine's only one."""
+    """Dotted name of the parameter `along`; by default a slider's stiffness, or a machine's only stiffness."""
     if along is None and rig.default_along is None:
         springs = [name for name, one in rig.parameters().items() if one.value and one.role.kind == "stiffness"]
         if len(springs) == 1:
@@ -148,14 +148,14 @@ def _answers(model: Model) -> dict[str, sp.Expr]:
 
 
 def formula_in_parts(rig: Slider | Machine, along: str | None = None) -> list[sp.Eq]:
-    """Formula of `formula` as one equation if short, else in the quantities of `small_signal`, then one equation each.
+    """Result of `formula` as one equation if short, else in quantities of `small_signal`, with an equation for each.
 
     Formulas of other parameters than a slider's stiffness are one equation.
 
     Raises
     ------
     NotAvailable
-        As `formula`.
+        In the same cases as `formula`.
     """
     whole = formula(rig, along)
     if sp.count_ops(whole) <= LEGIBLE or not is_own_stiffness(rig, _name(rig, along)):
@@ -163,15 +163,15 @@ def formula_in_parts(rig: Slider | Machine, along: str | None = None) -> list[sp
     known = _answers(build_model(rig))
     letters = {name: sp.Symbol(_LETTERS.get(name, name), real=True) for name in known}
     letters = {name: letters["mu"] if known[name] == known["mu"] else one for name, one in letters.items()}
-    told = {name: value for name, value in known.items() if sp.count_ops(value) > SHORT}
-    numerator, denominator = cubic.hopf_line(**(known | {name: letters[name] for name in told}))
+    lettered = {name: value for name, value in known.items() if sp.count_ops(value) > SHORT}
+    numerator, denominator = cubic.hopf_line(**(known | {name: letters[name] for name in lettered}))
     found = [sp.Eq(whole.lhs, sp.factor_terms(numerator) / sp.factor_terms(denominator), evaluate=False)]
-    lines = {letters[name]: value for name, value in told.items() if found[0].has(letters[name])}
+    lines = {letters[name]: value for name, value in lettered.items() if found[0].has(letters[name])}
     return found + [sp.Eq(letter, _gathered(value), evaluate=False) for letter, value in lines.items()]
 
 
 def _gathered(value: sp.Expr) -> sp.Expr:
-    """A sum with what its terms share in front; roots and functions stay as they are."""
+    """Sum with common factors of its terms taken out; roots and functions are kept unexpanded."""
     kept = [one for one in sp.ordered(value.atoms(sp.Pow, sp.Function)) if one.is_Function or not one.exp.is_Integer]
     names = {one: inner_symbol(f"kept_{i:03d}") for i, one in enumerate(kept)}
     terms = [sp.factor(term) for term in sp.Add.make_args(value.xreplace(names))]
@@ -180,11 +180,11 @@ def _gathered(value: sp.Expr) -> sp.Expr:
 
 
 class _TooLong(Exception):
-    """The time for a simplification is over."""
+    """Raised in the thread of a simplification when its time is over."""
 
 
 def _in_time(work: Callable[[], sp.Expr], otherwise: sp.Expr) -> sp.Expr:
-    """Result of `work`, or `otherwise` after `LONGEST` seconds: times of SymPy's simplifications are unpredictable."""
+    """Result of `work`, or `otherwise` if it takes more than `LONGEST` seconds, as SymPy's simplifications may."""
     found: list[sp.Expr] = []
     faults: list[Exception] = []
 
@@ -193,13 +193,13 @@ def _in_time(work: Callable[[], sp.Expr], otherwise: sp.Expr) -> sp.Expr:
             found.append(work())
         except _TooLong:
             pass
-        except Exception as error:  # raised again below, in the thread that asked
+        except Exception as error:  # raised again below, in the calling thread
             faults.append(error)
 
     thread = Thread(target=run, daemon=True)
     thread.start()
     thread.join(LONGEST)
-    for _ in range(10):  # SymPy is Python throughout and can be interrupted so; what Python ignores is raised again
+    for _ in range(10):  # SymPy is pure Python, so an exception can be raised in its thread; repeat if it is swallowed
         if thread.is_alive() and thread.ident is not None:
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(_TooLong))
             thread.join(0.1)
@@ -217,7 +217,7 @@ def _with_mu(expression: sp.Expr, mu: sp.Expr, levels: list[sp.Symbol]) -> sp.Ex
 
 
 def _shortest(numerator: sp.Expr, denominator: sp.Expr) -> sp.Expr:
-    """The quotient with common factors cancelled, factored where that is shorter, positive signs first."""
+    """Quotient with common factors cancelled, factored where that is shorter, with positive terms first."""
     top, bottom = sp.fraction(sp.cancel(sp.together(numerator / denominator)))
     top, bottom = (min((sp.factor(part), part), key=sp.count_ops) for part in (top, bottom))
     if bottom.subs(dict.fromkeys(bottom.atoms(sp.tan), 0)).could_extract_minus_sign():
@@ -226,7 +226,7 @@ def _shortest(numerator: sp.Expr, denominator: sp.Expr) -> sp.Expr:
 
 
 def _without_minus(product: sp.Expr) -> sp.Expr:
-    """A leading minus sign moved into a sum: b − a for −(a − b)."""
+    """Product with a leading minus sign moved into a sum: b − a for −(a − b)."""
     sign, factors = product.as_coeff_mul()
     sums = [factor for factor in factors if factor.is_Add]
     if sign >= 0 or not sums:

@@ -13,19 +13,19 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 
 # Chosen by trial: computing time against missed resonances.
-PLACES = 200  # periods, evenly spaced in their logarithm, at which the gain is computed
-PROMINENCE = 0.01  # least rise of ln(gain) above the dips on both sides of a resonance
-BESIDE = np.linspace(-8, 8, 33)  # further periods: distances from that of each mode, in widths of its peak
-SHARPNESS = 1e-5  # tolerance of a resonance's period, relative to the spacing of the periods beside it
+PLACES = 200  # number of periods, evenly spaced in their logarithm, at which the gain is computed
+PROMINENCE = 0.01  # least rise of ln(gain) above the minima on both sides of a resonance
+BESIDE = np.linspace(-8, 8, 33)  # further periods: distances from the period of each mode, in widths of its peak
+SHARPNESS = 1e-5  # tolerance of a resonance's period, relative to the spacing of neighbouring periods
 
 
 def transfer(rig: Slider | Machine, input: str, output: str, periods: Array) -> Array:
-    """Complex answer of an observable to a small wave of an input at periods (s), SI units; delays turn by e^(−iωτ)."""
-    return _Answer(rig, input, output)(periods)
+    """Complex transfer function from an input to an observable at periods (s), SI units; delays give e^(−iωτ)."""
+    return _TransferFunction(rig, input, output)(periods)
 
 
-class _Answer:
-    """G(iω) = C(iω − A)⁻¹B + D of `steadyslip.state_space`; with delays, which have none, by `receptance`."""
+class _TransferFunction:
+    """G(iω) = C(iω − A)⁻¹B + D of `steadyslip.state_space`; with delays, for which there is none, by `receptance`."""
 
     def __init__(self, rig: Slider | Machine, input: str, output: str) -> None:
         self.point, self.names = operating_point(rig), ((output,), (input,))
@@ -43,19 +43,19 @@ class _Answer:
         return np.asarray((c @ inner + d)[:, 0, 0])
 
     def modes(self) -> Array:
-        """Eigenvalues (1/s); with delays the rightmost."""
+        """Eigenvalues (1/s), (n,); with delays the rightmost ones only."""
         return np.asarray(eigenvalues(self.rig) if self.blocks is None else np.linalg.eigvals(self.blocks[0]))
 
 
 def resonances(rig: Slider | Machine, input: str, output: str, shortest: float, longest: float) -> Array:
-    """Resonances in a range of periods (s): period, gain, phase (degrees), largest gain first; (r, 3).
+    """Resonances in a range of periods (s), rows of period (s), gain and phase (degrees), largest gain first; (r, 3).
 
-    They are searched on a fine grid and near the period of every mode, however little damped.
+    Searched on a fine grid and near the period of every mode, so that lightly damped ones are found.
     """
     from scipy.optimize import minimize_scalar  # slow to import
     from scipy.signal import find_peaks
 
-    answer = _Answer(rig, input, output)
+    answer = _TransferFunction(rig, input, output)
     values = answer.modes()
     swinging = values[values.imag > 0]
     near = 2 * np.pi / swinging.imag * (1 + np.outer(BESIDE, np.abs(swinging.real) / np.abs(swinging)))

@@ -1,7 +1,7 @@
 """Eigenvalues with many digits, from the characteristic matrix evaluated by mpmath.
 
-Stiffnesses and velocities twenty decades apart lose all digits of some eigenvalues in double precision. Here digits are
-doubled until all eigenvalues agree with those of the step before, or with those of another route.
+If stiffnesses or velocities are twenty decades apart, double precision has no correct digit of some eigenvalues. Here
+the number of digits is doubled until all eigenvalues agree with those of the step before, or of another method.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows
 from steadyslip.model.point import OperatingPoint
 
-_DIGITS = (50, 100, 200, 400, 800, 1100)  # each twice the last; `_SHARE` of 1100 is more than the 308 decades of floats
-_SHARE = 0.3  # of the digits: decades beyond the machine's own rate from which on an eigenvalue is infinite
-_PLACE = 1.2345678  # in units of that rate, where the matrix is inverted: no eigenvalue
-_SAME = 1e-13  # relative difference of an eigenvalue at a number of digits and at half of them,
-_NEARLY = 1e-9  # and from what another route found, within which they agree
+_DIGITS = (50, 100, 200, 400, 800, 1100)  # attempts; `_SHARE` of 1100 is more than the 308 decades of floats
+_SHARE = 0.3  # an eigenvalue more decades above the typical rate than this share of the digits counts as infinite
+_PLACE = 1.2345678  # shift at which the matrix is inverted, in units of the typical rate: not an eigenvalue
+_SAME = 1e-13  # relative tolerance between an eigenvalue at a number of digits and at half of it
+_NEARLY = 1e-9  # relative tolerance between the eigenvalues here and those of another method
 _NEWTON_DIGITS, _MOST_STEPS = (
     60,
     30,
-)  # three times those of `_ARRIVED`; from 16 digits a few steps do
-_ARRIVED = 1e-20  # relative size of a step of Newton's method, after which the next changes nothing in floating point
+)  # digits: three times those of `_ARRIVED`; a few steps suffice from a start of 16 digits
+_ARRIVED = 1e-20  # relative size of the last step of Newton's method; the next would change no digit of a float
 
 
 def precise_eigenvalues(point: OperatingPoint, rough: ComplexArray) -> ComplexArray | None:
-    """All eigenvalues (1/s) of a single rig without delay, by falling real part; None where digits do not decide.
+    """All eigenvalues (1/s) of a single rig without delay, by falling real part; None if they do not converge.
 
     Parameters
     ----------
     point : OperatingPoint
         Of a single rig.
     rough : ndarray (n,) of complex
-        What another route found: as many as there should be, which with few digits may look infinite.
+        Eigenvalues of another method, which give the number: with few digits some may look infinite here.
     """
     rate = float(np.median(np.abs(rough))) or 1.0
     least = (np.log10(np.max(np.abs(rough))) - np.log10(rate)) / _SHARE
@@ -54,14 +54,14 @@ def precise_eigenvalues(point: OperatingPoint, rough: ComplexArray) -> ComplexAr
 
 
 def precise_root(point: OperatingPoint, near: complex) -> complex | None:
-    """The eigenvalue (1/s) of a single rig, with delays or without, to which Newton's method leads; None if to none.
+    """Eigenvalue (1/s) of a single rig, with delays or without, by Newton's method; None if it does not converge.
 
     Parameters
     ----------
     point : OperatingPoint
         Of a single rig.
     near : complex
-        1/s; where it starts.
+        Start, 1/s.
     """
     import mpmath  # slow to import
 
@@ -102,7 +102,7 @@ def _summed(table: list[Any], terms: list[Any], size: int) -> Any:
 
 @cached
 def _precise_matrix(model: Model) -> tuple[list[tuple[int, ...]], PreciseFunction, PreciseFunction]:
-    """Powers in the characteristic matrix, and functions of mpmath's numbers: what stands before each, and delays."""
+    """Powers of s and delays in the characteristic matrix; functions of mpmath numbers for coefficients and delays."""
     powers, entries = matrix_entries(model)
     arguments = list(model.arguments)
     return powers, PreciseFunction(arguments, entries), PreciseFunction(arguments, list(model.delays))
@@ -135,7 +135,7 @@ def _with_digits(point: OperatingPoint, digits: int, rate: float) -> ComplexArra
 
 
 def _parts(point: OperatingPoint, rate: Any) -> list[Any] | None:
-    """Matrices before s^0, s^1 and s² in the characteristic matrix, time in units of 1/rate; None if undefined."""
+    """Coefficients of s^0, s^1 and s² in the characteristic matrix, time in units of 1/rate; None if undefined."""
     import mpmath
 
     powers, entries, _ = _precise_matrix(point.model)
@@ -149,7 +149,7 @@ def _parts(point: OperatingPoint, rate: Any) -> list[Any] | None:
 
 
 def _pencil(p0: Any, p1: Any, p2: Any) -> tuple[Any, Any]:
-    """A and E with (A − s E) z = 0 where (P0 + s P1 + s² P2) y = 0; z are y, and s y of columns that have an s²."""
+    """A and E with (A − s E) z = 0 where (P0 + s P1 + s² P2) y = 0; z is y, then s y for columns with nonzero P2."""
     import mpmath
 
     n = p0.rows
@@ -167,7 +167,7 @@ def _pencil(p0: Any, p1: Any, p2: Any) -> tuple[Any, Any]:
 
 @cached
 def matrix_entries(model: Model) -> tuple[list[tuple[int, ...]], list[sp.Expr]]:
-    """Powers of s and of exp(−s delay) in the characteristic matrix, and row by row what stands before each."""
+    """Powers of s and of exp(−s delay) in the characteristic matrix; coefficients of each, entry by entry in rows."""
     entries = [entry for row in characteristic_rows(model).values() for entry in row]
     powers = sorted({own for entry in entries for own in entry})
     return powers, [entry.get(own, sp.Integer(0)) for entry in entries for own in powers]

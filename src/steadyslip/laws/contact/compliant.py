@@ -11,8 +11,8 @@ class Compliant(ContactLaw, name="compliant"):
     """Surfaces with a normal stiffness and damping: σ = −k_n u − c_n u̇ with u their distance.
 
     For bodies of a machine that move away from the surface (`PlanarBody`), so that normal and tangential vibration
-    couple. The steady normal force follows from the balance of forces, or is given where it is known (a clamping force
-    measured in service): then the distance counts from where it is in steady sliding.
+    couple. The steady normal force follows from the balance of forces, or is given if it is known (a clamping force
+    measured in service); u is then measured from its value in steady sliding.
     """
 
     normal_stiffness: float = parameter("Pa/m", positive, "normal stiffness k_n", kind="stiffness", letter="k_n")

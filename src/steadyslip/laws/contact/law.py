@@ -110,13 +110,13 @@ class Shape:
 class ContactLaw(FrozenRecord, family="contact law"):
     """Base of contact laws: normal stress σ (Pa, compression positive) from the motion.
 
-    σ = `load` + `coupling`(motion): a constant part and one that depends on the motion. If the steady normal stress is
-    given instead of the load, σ is that plus the change of the coupling from its steady value. σ <= 0 is loss of
-    contact. Methods are pure, read the record's own fields and return SymPy expressions.
+    σ = `load` + `coupling`(motion): a constant part and a part that depends on the motion. If the steady normal stress
+    is given instead of the load, σ is the steady stress plus the change of the coupling from its steady value. σ <= 0
+    is loss of contact. Methods are pure, read the record's own fields and return SymPy expressions.
     """
 
     lock_up: ClassVar[str] = ""
-    """What must hold lest it locks up, for messages; {inverse} becomes 1/μss and {angle} arccot μss in degrees."""
+    """Condition for no lock-up, for messages; {inverse} is replaced by 1/μss and {angle} by arccot μss in degrees."""
 
     def load(self) -> Expression | None:
         """Normal stress without the coupling, σ0 (Pa); None if `steady_stress` is given instead."""

@@ -11,7 +11,7 @@ USUAL = RateState.name
 
 
 def weakest(share: float) -> FrictionLaw:
-    """Friction of a constant, usually tiny, share of the normal stress: for loops without any."""
+    """Coulomb law with a given, usually tiny, friction coefficient: for control loops without friction."""
     return Coulomb(mu_coulomb=share)
 
 

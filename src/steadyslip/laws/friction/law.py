@@ -30,7 +30,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     decided_besides: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def doubts(self) -> Iterator[str]:
-        """Yield what is unusual about allowed values, in a sentence each that begins with a name in ``friction.``."""
+        """Yield a sentence on each allowed but unusual value; it begins with the parameter's name in ``friction.``."""
         yield from ()
 
     def memory(self) -> tuple[str, ...]:
@@ -71,12 +71,12 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         return self.strength(v, sigma, memory, tau)
 
     def rest_strength(self, sigma: Expression) -> Expression:
-        """Largest friction stress (Pa) at rest of a law without memory: that of slow sliding unless overridden."""
+        """Largest friction stress (Pa) at rest of a law without memory; by default the limit of slow sliding."""
         v = sp.Symbol("v", positive=True)
         return sp.sympify(self.strength(v, sigma, (), sp.nan)).subs(v, 0)
 
     def slow_velocity(self) -> Expression | None:
-        """Velocity (m/s) below which a contact with memory counts as at rest; None for laws that cannot hold."""
+        """Velocity (m/s) below which a contact with memory counts as at rest; None for laws without static friction."""
         return None
 
     def direction(self, v: Expression, velocity: Expression) -> Expression:
@@ -94,9 +94,9 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     def alternatives(self) -> Mapping[str, Callable[[Any], FrictionLaw]]:
         """Functions that turn a law into an alternative of the same kind, by word, in the order of application.
 
-        Labels of laws are lists of such words: `aging, two states`. The class attribute `compared` lists the labels
-        that are fitted by default; `decided_by_stress` has, by field, the words among which records with changing
-        normal stress decide, and `decided_besides` words of other fields that are compared along with these.
+        A label of a law is a list of these words: `aging, two states`. The class attribute `compared` lists the labels
+        that are fitted by default. By field of the law, `decided_by_stress` has the words that records with changing
+        normal stress can discriminate, and `decided_besides` words of other fields that are compared as well.
         """
         return {}
 
@@ -121,7 +121,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         }
 
     def meanings(self) -> dict[str, str]:
-        """Short explanations of `observables` and `memory` by name, for other readers; may be incomplete."""
+        """Short explanations of `observables` and `memory` by name, for pages and reports; may be incomplete."""
         return {}
 
 

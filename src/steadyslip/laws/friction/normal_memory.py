@@ -1,4 +1,4 @@
-"""Laws for the memory of normal stress: the response of friction to its history; one class per law."""
+"""Laws for the memory of normal stress: the response of friction to the history of σ; one class per law."""
 
 from __future__ import annotations
 

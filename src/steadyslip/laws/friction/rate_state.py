@@ -91,7 +91,7 @@ class RateState(FrictionLaw, name="rate-state"):
                 yield Condition(name, np.asarray(b) != 0, message, (b,))
 
     def runs_away(self) -> bool:
-        """True unless only evolution effects have cut-off velocities, so that the direct effect outlasts them."""
+        """True unless all evolution effects, and not the direct effect, have cut-off velocities."""
         return self.a_cutoff_velocity is not None or any(cutoff is None for cutoff in self._state_cutoffs())
 
     def motion_conditions(self) -> Iterator[Condition]:
@@ -193,7 +193,7 @@ class RateState(FrictionLaw, name="rate-state"):
         return tuple(part * whole for part in self.normal_memory.parts(self.states))
 
     def _stress_memory(self, memory: Expressions) -> Expressions:
-        """Memory variables of the memory of normal stress, which are the last ones."""
+        """Memory variables that belong to the memory of normal stress: the last ones."""
         return memory[len(self._all_states()) :]
 
     def _b_theta(self, sigma: Expression, memory: Expressions, tau: Expression) -> Expressions:
@@ -294,7 +294,7 @@ class RateState(FrictionLaw, name="rate-state"):
         found = self.normal_memory.meanings()
         for suffix in [""] if count == 1 else [f"_{i}" for i in range(1, count + 1)]:
             found["Theta" + suffix] = f"state of friction, of which b{suffix} Θ{suffix} is added to the coefficient"
-            found["theta" + suffix] = "the same state, told as a time"
+            found["theta" + suffix] = "the same state, expressed as a time"
             if self._has_offset():
                 found["Psi" + suffix] = f"b{suffix} Θ{suffix} with the part of the stresses, continuous where they jump"
         return found

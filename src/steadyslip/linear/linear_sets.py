@@ -16,9 +16,9 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.posed import late_on_springs, spare_powers
 from steadyslip.model.range import characteristic, delays_in_terms, quasipolynomial
 
-_FAR = 1e12  # edges beyond this factor from the size of a parameter, up or down, are rounding of infinity or zero
-_FACTORS = np.array([1 / APART, 1.0, APART])  # multiples of that size at which the polynomial is evaluated
-_SIZES = 3  # attempts at a size at which p and f q have coefficients of similar size; by trial
+_FAR = 1e12  # edges further than this factor from the parameter's size are rounding error of infinity or zero
+_FACTORS = np.array([1 / APART, 1.0, APART])  # multiples of the parameter's size at which the polynomial is evaluated
+_SIZES = 3  # attempts to find a size at which p and f q have coefficients of similar size; by trial
 _WINDOWS = 8  # stable intervals kept per rig with delay in arrays; by trial: memory against completeness
 
 
@@ -47,7 +47,7 @@ def sets_of(point: OperatingPoint, name: str, size: Array | None = None, *, edge
     """Stable intervals of one parameter for arrays of rigs, SI units, (..., m, 2), NaN padded.
 
     `size` (...) are positive values to search around for rigs with delay; by default the rigs' own values. With `edges`
-    ends that are none, but ends of what is known under a delay, are NaN.
+    an end at which only the searched range ends, under a delay, is NaN.
 
     Raises
     ------

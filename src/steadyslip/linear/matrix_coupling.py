@@ -1,6 +1,6 @@
 """Edges of machines given by matrices that nothing damps: from "no root grows" to "a root grows" (theory 13).
 
-As in `coupling`, with the squares of the roots from M⁻¹ K in place of a polynomial.
+Same method as in `coupling`; the squares of the roots are eigenvalues of −M⁻¹ K instead of roots of a polynomial.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from steadyslip.model.numeric.machine_point import MachinesAlong
 from steadyslip.model.numeric.pencil import UNDECIDED, StatePencil
 
 _PART = 1e-6
-"""Imaginary share from which two squares of roots are a pair: rounding of a double one makes some 1e-8, and the pair
-has this share 1e-12 of the parameter beyond the edge."""
-_RISE = 1e-12  # share of the largest square from which one is positive, and not the zero of a body that nothing holds
+"""Relative imaginary part above which two squares of roots are a complex pair. Rounding of a double square makes some
+1e-8; beyond the edge the pair reaches this value within 1e-12 of the parameter."""
+_RISE = 1e-12  # least positive square over the largest; smaller is rounding of the zero of an unsupported body
 
 
 class UndampedMatrixSearch(MatrixSearch):
@@ -83,14 +83,14 @@ def growing_squares(u: ComplexArray) -> NDArray[np.bool_]:
 
 
 def nothing_damps(pencil: StatePencil | None) -> bool:
-    """True if no force of a machine follows a velocity, and nothing remembers."""
+    """True if no force of a machine depends on velocity or memory."""
     return (
         pencil is not None and len(pencil.a) == 2 * pencil.size and not np.any(pencil.a[pencil.size :, pencil.size :])
     )
 
 
 def search_matrices(machine: Machine, name: str) -> MatrixSearch:
-    """Search for edges of stability, or of growth where a machine is undamped at all its values."""
+    """Make the search for edges of stability, or of growth if the machine is undamped at all values."""
     found = MatrixSearch(machine, name)
     if not found.own.balance.exists or not nothing_damps(found.own.pencil):
         return found

@@ -17,7 +17,7 @@ STABLE_WORD, UNSTABLE_WORD, ABSENT_WORD = "stable", "unstable", "no steady slidi
 
 
 def require_matrices(machine: Machine) -> MachinePoint:
-    """The machine in numbers, checked to be within the range of floating point.
+    """Numeric operating point of a machine, checked to be within the range of floating point.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Edges of stability in one parameter of a machine given by matrices.
 
-A parameter that enters by a term of rank one, whatever the machine's size, has its edges among the values at which a
-scalar response of the unchanged machine is real (theory 13). Of others roots are counted along the parameter, and of
-one that changes a whole structure by eigenvalues, which takes minutes for hundreds of degrees of freedom.
+The edges of a parameter that changes the matrices by a term of rank one are among the values at which a scalar response
+of the unchanged machine is real, whatever the machine's size (theory 13). For other parameters roots are counted along
+the parameter; if it changes a whole structure, by eigenvalues, which takes minutes for hundreds of degrees of freedom.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from steadyslip.model.numeric.change import LowRankChange, Turns, change_between
 from steadyslip.model.numeric.machine_point import MachinePoint, MachinesAlong, absence, machine_point
 from steadyslip.model.numeric.pencil import ILL_POSED, UNDECIDED, StatePencil, real_product
 
-_SHARE = 4  # samples are fewer than those of a small machine by this factor: 10 per decade
-_BRACKET = 1e-9  # relative width to which a bracket is narrowed by counting; then Newton's method
+_SHARE = 4  # factor by which samples are fewer than in `search`: 10 per decade
+_BRACKET = 1e-9  # relative width to which a bracket is narrowed by counting, before Newton's method
 _NEAR = 1e-3  # relative width of a bracket from which Newton's method mostly converges
-_BESIDE = 1e-3  # stability at the end of steady sliding is asked this share of the bracket inside it
-_FAR = 1e12  # ratio of two values beyond which the lower is a zero that rounding hides
-_PARTS = 32  # of a bracket of a small machine, counted together
-_HALVINGS = 60  # of a bracket at most: to neighbouring numbers
+_BESIDE = 1e-3  # where steady sliding ends, stability is evaluated this share of the bracket inside
+_FAR = 1e12  # ratio of two values above which the lower one is a zero with rounding error
+_PARTS = 32  # pieces of a bracket of a small machine, counted together
+_HALVINGS = 60  # most halvings of a bracket: down to neighbouring numbers
 _SMALL = 64  # rows of a pencil up to which eigenvalues cost less than turns of a response
-FLOPS = 40  # cubed rows of a pencil whose eigenvalues take as long as one term of a count (`allowance`), measured
-_TOGETHER = 2**20  # numbers of matrices that are treated together, 8 MiB
-_NEWTON = 12  # steps of Newton's method at most; its convergence is quadratic
-_LIKELY = 3  # eigenvalues nearest to the axis, by each measure, that are tried as the one that crosses
-_REACH = 4.0  # widths of the bracket that Newton's method may go
-_LAST = 4 * np.finfo(float).eps  # relative step at which Newton's method has ended
-_ROUNDING = 1e-11  # relative step up to which one that no longer falls is rounding of large matrices
-_APART = 1e-7  # relative step of differences of the determinant along a nonlinear parameter: the root of rounding
-_PROBES = (0.5, 2.0, 7.0)  # multiples of a parameter at which it is asked whether it enters linearly
+FLOPS = 40  # eigenvalues of n rows count as n**3/FLOPS terms of `allowance`, by measured time
+_TOGETHER = 2**20  # most entries of matrices that are treated together, 8 MiB
+_NEWTON = 12  # most steps of Newton's method; its convergence is quadratic
+_LIKELY = 3  # number of eigenvalues nearest to the axis, by each measure, that are tried as the one that crosses
+_REACH = 4.0  # largest distance that Newton's method may go, in widths of the bracket
+_LAST = 4 * np.finfo(float).eps  # relative step at which Newton's method has converged
+_ROUNDING = 1e-11  # relative step below which a step that no longer falls is rounding error of large matrices
+_APART = 1e-7  # relative step of differences of the determinant along a nonlinear parameter: ~sqrt(eps)
+_PROBES = (0.5, 2.0, 7.0)  # multiples of a parameter's value at which linearity is tested
 
 
 class MatrixSearch:
@@ -54,11 +54,11 @@ class MatrixSearch:
 
     hides = False
     decided = -np.inf, np.inf
-    """As of `Search`: no edge lies where roots cannot be counted."""
+    """`hides` and `decided` as in `Search`; without delays roots can be counted everywhere."""
 
     @cached_property
     def searched(self) -> tuple[float, float]:
-        """Default range."""
+        """Default range of the search, SI units."""
         grid = self.grid()
         return float(grid[0]), float(grid[-1])
 
@@ -87,7 +87,7 @@ class MatrixSearch:
 
     @cached_property
     def _small(self) -> bool:
-        """True if eigenvalues are counted; turns of a response need steady sliding at the parameter's own value."""
+        """True if roots are counted by eigenvalues: small machines, and machines without steady sliding themselves."""
         return not self.own.balance.exists or len(self.own.pencil.a) <= _SMALL
 
     def _pencil(self, value: float) -> StatePencil | None:
@@ -95,7 +95,7 @@ class MatrixSearch:
         return self.own.along(self.name, np.array([value])).pencil(0)
 
     def statuses(self, values: Array, sure: bool = True) -> NDArray[np.int64]:
-        """Status at values (p,): ABSENT, STABLE, UNSTABLE; UNKNOWN where nothing holds a body.
+        """Status at values (p,): ABSENT, STABLE, UNSTABLE; UNKNOWN where a body is unsupported.
 
         If `sure`, UNKNOWN also where rounding hides whether a root grows.
         """
@@ -115,12 +115,12 @@ class MatrixSearch:
         return len(self.own.along(self.name, np.array([self.value])).a[0])
 
     def parts(self, count: int) -> list[slice]:
-        """Parts of so many machines that are treated together."""
+        """Slices of `count` machines that are treated together."""
         together = max(_TOGETHER // self._rows**2, 1)
         return [slice(start, start + together) for start in range(0, count, together)]
 
     def _growing(self, machines: MachinesAlong, sure: bool) -> NDArray[np.int64]:
-        """Number of growing roots, (p,), ILL_POSED or UNDECIDED. Of large machines by turns of a response."""
+        """Number of growing roots, (p,), ILL_POSED or UNDECIDED; for large machines by turns of a response."""
         if self._small or self.turns is None:
             count = len(machines.posed)
             if not self._small and not may_take(count * len(self.own.pencil.a) ** 3 // FLOPS):
@@ -136,7 +136,7 @@ class MatrixSearch:
 
     @cached_property
     def _probes(self) -> tuple[list[float], list[StatePencil]]:
-        """Steps from the own value, and pencils there."""
+        """Steps from the parameter's own value to `_PROBES` inside its domain, and the pencils there."""
         size = abs(self.value) or self._sizes[0]
         values = [self.value + size * (f - 1) if self.value == 0 else self.value * f for f in _PROBES]
         if np.isfinite(self.role.domain.high):  # angles and shares
@@ -152,12 +152,12 @@ class MatrixSearch:
 
     @cached_property
     def change(self) -> LowRankChange | None:
-        """Directions in which the parameter changes the pencil; None if it changes nothing."""
+        """Low-rank change of the pencil by the parameter; None if it changes nothing."""
         return change_between(self.own.pencil, self._probes[1])
 
     @cached_property
     def turns(self) -> Turns | None:
-        """Turns of a response; None if the parameter changes nothing, or more than a response of few directions."""
+        """Turns of a response; None if the parameter changes nothing, or the pencil in too many directions."""
         return None if self.change is None or self.change.is_wide else Turns(self.change)
 
     # -- edges
@@ -198,7 +198,7 @@ class MatrixSearch:
         return tuple(found)
 
     def _lost(self, grid: Array) -> Array:
-        """Values at which steady sliding ends, from samples."""
+        """Values at which steady sliding begins or ends, bracketed by samples `grid`."""
         if not self.steady_changes:
             return np.empty(0)
         there = self._slides(grid)
@@ -206,9 +206,9 @@ class MatrixSearch:
 
     @cached_property
     def steady_changes(self) -> bool:
-        """True if the parameter changes the stresses of steady sliding or what it lacks to lock-up."""
+        """True if the parameter changes the stresses of steady sliding or the distance from lock-up."""
         steps, rounding = np.array(self._probes[0]), 1e-12
-        if len(steps) < len(_PROBES):  # some are out of the domain, or do not slide
+        if len(steps) < len(_PROBES):  # some probes are out of the domain or without steady sliding
             return True
         own, other = self.own.balance, self.own.balances_along(self.name, self.value + steps)
         moved = np.abs(other.sigma - own.sigma) > rounding * own.sigma
@@ -248,7 +248,7 @@ class MatrixSearch:
         return [self._described(end, 0.0, below, status), *after]
 
     def _described(self, value: float, beta: float, below: int, above: int) -> Boundary:
-        """Edge at a value; where steady sliding ends, with what ends it."""
+        """Make the Boundary at a value; where steady sliding ends, its kind is the condition that fails."""
         if ABSENT not in (below, above):
             return self._boundary(value, "oscillatory" if beta else "divergence", beta, below, above)
         step = -_APART if below == ABSENT else _APART
@@ -275,7 +275,7 @@ class MatrixSearch:
     def _narrowed(
         self, low: float, high: float, where: Callable[[Array], NDArray[np.bool_]], width: float
     ) -> tuple[float, float]:
-        """Bracket, of relative `width` or of neighbouring numbers, in which a property first changes."""
+        """Bracket (of relative `width`, or neighbouring numbers) around the first change of the property `where`."""
         parts, first = _PARTS if self._small else 2, bool(where(np.array([low]))[0])
         for _ in range(int(_HALVINGS / np.log2(parts))):
             inner = low + (high - low) * np.arange(1, parts) / parts
@@ -311,7 +311,7 @@ class MatrixSearch:
         return middle, next(self._likely_of_roots(pencil))
 
     def _likely(self, pencil: StatePencil) -> Iterator[float]:
-        """Frequencies at which a root may cross the axis near a pencil, the likeliest first."""
+        """Frequencies (rad/s) at which a root may cross the axis near a pencil, the likeliest first."""
         if not self._small and self.turns is not None:
             yield from self.turns.least(self.turns.change.core_of(pencil), _LIKELY)
         yield from self._likely_of_roots(pencil)
@@ -345,7 +345,7 @@ class MatrixSearch:
 
 
 def _followed(here: StatePencil, there: StatePencil, near: complex, step: float) -> tuple[complex, complex]:
-    """Eigenvalue of a pencil nearest to a place, and its slope along the parameter (first-order perturbation)."""
+    """Eigenvalue of a pencil near `near` (1/s), and its derivative by the parameter (first-order perturbation)."""
     u, v = here.vectors(near)
     rates, places = real_product(here.e, v), real_product(here.a, v)
     normal = u @ rates
@@ -355,13 +355,13 @@ def _followed(here: StatePencil, there: StatePencil, near: complex, step: float)
 
 
 def _between(low: float, high: float) -> float:
-    """A value between two others, the geometric mean where both have one sign and are not too far apart."""
+    """Value between two others: the geometric mean if they have one sign and are not too far apart, else the mean."""
     ratio = high / low if low else 0.0
     return float(np.sign(low) * np.sqrt(low * high)) if 1 / _FAR < ratio < _FAR else 0.5 * (low + high)
 
 
 def _distinct(values: Array, omega: Array) -> tuple[Array, Array]:
-    """Rising values without those that repeat the one before to rounding."""
+    """Rising values, with their frequencies, without duplicates to within rounding."""
     keep = np.diff(values, prepend=-np.inf) > 1e-12 * np.abs(values)
     return values[keep], omega[keep]
 

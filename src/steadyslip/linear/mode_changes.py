@@ -1,4 +1,4 @@
-"""Slopes of an eigenvalue with every parameter of a machine, and with what could be added at a point or in a link.
+"""Derivatives of an eigenvalue by parameters of a machine, and by springs, dampers and masses that could be added.
 
 By first-order perturbation: dλ = −u (dP) v / (u P'(λ) v), with P(s) = s E − A and u, v its left and right null vectors.
 """
@@ -16,26 +16,26 @@ from steadyslip.core.pages import Displayed
 from steadyslip.machine.mechanism import LOAD_POINT, NORMAL, Shares
 from steadyslip.model.numeric.machine_point import MachinePoint
 
-_STEP = 0.01  # relative, of differences of the matrices; nothing if these are linear in the parameter
-_STENCIL = np.array([-1, 9, -45, 45, -9, 1]) / 60  # central differences of sixth order: 1e-12 of smooth matrices
-_PLACES = np.array([-3, -2, -1, 1, 2, 3])  # of the stencil, in steps
+_STEP = 0.01  # relative step of differences of matrices; exact if the matrices are linear in the parameter
+_STENCIL = np.array([-1, 9, -45, 45, -9, 1]) / 60  # central differences of sixth order: error 1e-12 if smooth
+_PLACES = np.array([-3, -2, -1, 1, 2, 3])  # positions of `_STENCIL`, in steps
 ADDED = ("spring", "damper", "mass")
 SLIDING, TURNING = ("N/m", "N s/m", "kg"), ("N m/rad", "N m s/rad", "kg m^2")
 
 
 @dataclass(frozen=True)
 class ModeChange(Displayed):
-    """How fast an eigenvalue follows a parameter, or something that is added.
+    """Derivative of an eigenvalue by a parameter, or by a spring, damper or mass that is added.
 
     Attributes
     ----------
     name : str
         Dotted name of a parameter; or of the end or link at which something is added.
     value : float or None
-        Of the parameter (SI); None for what is added.
+        Value of the parameter (SI); None for additions.
     unit : str
     slope : complex
-        dλ/dp, 1/s over the unit: the real part is that of the growth rate.
+        dλ/dp, 1/s over `unit`; the real part is the derivative of the growth rate.
     added : str
         ``spring``, ``damper`` or ``mass``, towards the ground or in a link; empty for a parameter.
     """
@@ -48,7 +48,7 @@ class ModeChange(Displayed):
 
     @property
     def relative(self) -> complex:
-        """dλ (1/s) for a parameter that is larger by all of its own size; NaN for what is added."""
+        """Derivative dλ/d ln|p| (1/s); NaN for additions."""
         return complex(np.nan, np.nan) if self.value is None else self.slope * abs(self.value)
 
     def to_dict(self) -> dict[str, Any]:
@@ -58,7 +58,7 @@ class ModeChange(Displayed):
 
 
 class Perturbation:
-    """Slopes of one eigenvalue s (1/s) of a machine."""
+    """Derivatives of one eigenvalue s (1/s) of a machine."""
 
     def __init__(self, point: MachinePoint, s: complex) -> None:
         self.point, self.s = point, s
@@ -66,7 +66,7 @@ class Perturbation:
         self.scale = self.left @ point.pencil.e @ self.right
 
     def by_parameter(self, name: str, value: float) -> complex:
-        """dλ/dp of a parameter with a value that is not zero; NaN where steady sliding ends beside it."""
+        """Derivative dλ/dp by a parameter with a nonzero value; NaN if steady sliding ends close to it."""
         machines = self.point.along(name, value * (1 + _STEP * _PLACES))
         if not np.all(machines.balance.exists):
             return complex(np.nan, np.nan)
@@ -75,22 +75,22 @@ class Perturbation:
         return complex(-change / (_STEP * value * self.scale))
 
     def by_addition(self, row: Array, power: int) -> complex:
-        """dλ for a force −s^power · row against what moves along a row (n,): a spring, a damper or a mass for 0, 1, 2.
+        """Derivative of λ by a spring, damper or mass (`power` 0, 1, 2) from the ground to the motion along `row` (n,).
 
-        Relative to the ground.
+        The force is −s^power · displacement.
         """
         n = len(row)
         moved, pushed = self.right[:n] @ row, self.left[n : 2 * n] @ row
         return complex(-(self.s**power) * pushed * moved / self.scale)
 
     def parameters(self) -> Iterator[ModeChange]:
-        """Yield the slopes with all parameters that are not zero."""
+        """Yield the derivatives by all nonzero parameters."""
         for name, one in self.point.machine.parameters().items():
             if one.value:
                 yield ModeChange(name, float(one.value), one.role.unit, self.by_parameter(name, float(one.value)))
 
     def additions(self) -> Iterator[ModeChange]:
-        """Yield the slopes with springs, dampers and masses from ends to the ground, and with what links lack."""
+        """Yield the derivatives by springs, dampers and masses to the ground, and by properties that links lack."""
         machine = self.point.machine
         for end in machine.ends():
             turns = end in machine.bodies and machine.bodies[end].turns
@@ -115,8 +115,7 @@ class Perturbation:
 
 
 def changes_of(point: MachinePoint, s: complex) -> tuple[ModeChange, ...]:
-    """Slopes of an eigenvalue with the parameters, largest change of the growth rate for a share of its value first,
-    and then with what is added."""
+    """Derivatives of an eigenvalue by parameters, largest effect on the growth rate first, then by additions."""
     found = Perturbation(point, s)
     known = [one for one in found.parameters() if np.isfinite(one.slope)]
     return (*sorted(known, key=lambda one: -abs(one.relative.real)), *found.additions())

@@ -28,12 +28,12 @@ from steadyslip.linear.stiffness import eigenvalues
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
-LOWER, HIGHER = 0.1, 2.0  # times the own value, ends of the range unless one is given
-_SHY = 0.98  # share of the way from the own value to an end of the parameter's domain, which may be excluded
-POINTS = 33  # of the parameter at first; as many are put between, and more where it is not clear what becomes what
-MOST_POINTS = 8 * POINTS
-_CLEAR = 0.5  # share of the distance to its neighbours by which an eigenvalue moves from point to point at most
-_SAME = 1e-6  # relative distance up to which eigenvalues are one that is double, whose two columns are alike
+LOWER, HIGHER = 0.1, 2.0  # default range of the parameter, times its own value
+_SHY = 0.98  # largest share of the way from the own value to an end of the domain, which may be excluded
+POINTS = 33  # first values of the parameter; midpoints are added, and more where eigenvalues cannot be matched
+MOST_POINTS = 8 * POINTS  # bounds the time
+_CLEAR = 0.5  # largest step of an eigenvalue between neighbouring values, over the distance to other eigenvalues
+_SAME = 1e-6  # relative distance up to which two eigenvalues count as one double eigenvalue
 _SPREAD = 30.0  # ratio of the ends of a range from which points are spaced evenly in the logarithm
 
 
@@ -46,16 +46,16 @@ class ModeChart(Displayed):
     rig : Machine
     parameter, unit : str
     values : ndarray (p,)
-        Of the parameter (SI), rising; closer together where eigenvalues change quickly.
+        Values of the parameter (SI), rising; closer together where eigenvalues change quickly.
     eigenvalues : ndarray (p, n), complex
-        1/s, with β > 0: one column for each oscillation, NaN where it is none or steady sliding does not exist.
+        1/s, with β > 0: one column for each oscillation, NaN where it does not oscillate or steady sliding is absent.
     numbers : tuple of int
-        Of the columns: places by rising frequency in the machine as it is, as `Mode.number`, or at the nearest end of
-        the range; 0 for what oscillates elsewhere only.
+        For each column its `Mode.number`, the place by rising frequency, in the machine as it is, or at the nearest end
+        of the range; 0 for oscillations that exist at other values only.
     edges : tuple of Boundary
-        Where stability changes.
+        Values at which stability changes.
     origins : tuple of Origin
-        Why oscillations grow, one for each stretch in which one does, where it grows fastest.
+        Reasons of growth, one for each interval of unstable values, at the value of fastest growth.
     """
 
     rig: Machine
@@ -69,28 +69,28 @@ class ModeChart(Displayed):
 
     @property
     def frequencies(self) -> Array:
-        """Hz, (p, n)."""
+        """Frequencies in Hz, (p, n)."""
         return self.eigenvalues.imag / (2 * np.pi)
 
     @property
     def damping_ratios(self) -> Array:
-        """−Re λ/|λ|, (p, n): negative where the oscillation grows."""
+        """Damping ratios −Re λ/|λ|, (p, n); negative where the oscillation grows."""
         return -self.eigenvalues.real / np.abs(self.eigenvalues)
 
     @property
     def is_geometric(self) -> bool:
-        """True if the range is so wide that the values are spaced evenly in their logarithm."""
+        """True if the values are spaced evenly in their logarithm, as for a wide range."""
         return _is_wide(float(self.values[0]), float(self.values[-1]))
 
     @property
     def least_damped(self) -> tuple[int, ...]:
-        """Columns of at most eight oscillations that are damped least anywhere, by rising frequency."""
+        """Columns of the (at most eight) oscillations with the smallest damping ratios, by rising frequency."""
         least = np.nanmin(self.damping_ratios, axis=0)
         kept = np.sort(np.argsort(least)[:MOST])
         return tuple(int(i) for i in kept)
 
     def plot(self, kind: str | None = None, ax: Any = None) -> Any:
-        """A figure: ``"chart"``, frequencies and damping ratios over the parameter."""
+        """Figure of frequencies and damping ratios over the parameter; kind ``"chart"``."""
         return draw(self, kind, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
@@ -159,14 +159,14 @@ class ModeChart(Displayed):
         return self.rig.with_values({self.parameter: float(self.values[place])})
 
     def told(self, value: float) -> str:
-        """A value of the parameter with its unit."""
+        """Text of a value (SI) of the parameter with its unit."""
         with displayed_as(self.rig.written_as(self.parameter)):
             return format_quantity(value, self.unit, area=self.rig.printed_area(self.parameter)) or "0"
 
 
 @checked(between=LOW_AND_HIGH)
 def mode_chart(rig: Slider | Machine, name: str, between: Sequence[Any] | None = None) -> ModeChart:
-    """Frequencies and damping ratios of all oscillations along a parameter: the picture in which modes couple.
+    """Frequencies and damping ratios of all oscillations of a machine along a parameter, which show where modes couple.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def mode_chart(rig: Slider | Machine, name: str, between: Sequence[Any] | None =
     name : str
         Dotted name, or a unique last part, of a parameter: a friction coefficient, a load, the drive's velocity.
     between : (low, high), optional
-        SI units or text such as ``"10 mm/s"``; unless given from a tenth of the machine's own value to twice that.
+        Range, in SI units or text such as ``"10 mm/s"``; by default from 0.1 to 2 times the machine's own value.
 
     Returns
     -------
@@ -186,7 +186,7 @@ def mode_chart(rig: Slider | Machine, name: str, between: Sequence[Any] | None =
         If the name is unknown, or the range is not inside the parameter's domain; without `between` also if the own
         value is zero.
     NotAvailable
-        Of a slider, and if nothing oscillates in this range.
+        For a slider, and if nothing oscillates in the range.
 
     Examples
     --------
@@ -232,11 +232,11 @@ def _range(rig: Machine, name: str, between: Sequence[Any] | None) -> tuple[floa
 
 
 def followed(roots_at: Callable[[Array], ComplexArray], values: Array) -> tuple[Array, ComplexArray]:
-    """Oscillations along rising values of a parameter: values (p,) and eigenvalues (p, n), NaN where there are none.
+    """Oscillations followed along a parameter: values (p,), with some added, and eigenvalues (p, n), NaN if absent.
 
-    Between two values a third tells whether each eigenvalue becomes what the two alone would say; where it does not, or
-    one moves too far, further values are put there, up to `MOST_POINTS`. What then is not clear is the meeting of two
-    in one place, where either way is right.
+    Eigenvalues at neighbouring values are matched, and a midpoint checks the match; where it gives another match, or an
+    eigenvalue moves too far, further values are added, up to `MOST_POINTS`. Matches that are still ambiguous then are
+    of eigenvalues that meet, where both are right.
     """
     known = dict(zip(values.tolist(), map(_oscillations, roots_at(values)), strict=True))
     least = (values[-1] - values[0]) / MOST_POINTS**2
@@ -249,7 +249,7 @@ def followed(roots_at: Callable[[Array], ComplexArray], values: Array) -> tuple[
         unclear = [pair for part in doubted for pair in pairwise(part)]
     order = sorted(known)
     paths: list[ComplexArray] = []
-    last: dict[int, int] = {}  # path of each root of the value before
+    last: dict[int, int] = {}  # index of the path of each root at the previous value
     for place, value in enumerate(order):
         roots = known[value]
         now = {}
@@ -271,7 +271,7 @@ def _oscillations(roots: ComplexArray) -> ComplexArray:
 
 
 def _pairs(before: ComplexArray, after: ComplexArray) -> tuple[Array, Array]:
-    """Places of eigenvalues in two sets that belong together: those with the least sum of distances."""
+    """Indices of matching eigenvalues in two sets: the assignment with the least sum of distances."""
     from scipy.optimize import linear_sum_assignment  # slow to import
 
     rows, columns = linear_sum_assignment(np.abs(before[:, None] - after))
@@ -279,7 +279,7 @@ def _pairs(before: ComplexArray, after: ComplexArray) -> tuple[Array, Array]:
 
 
 def _is_clear(before: ComplexArray, between: ComplexArray, after: ComplexArray) -> bool:
-    """True if all three sets have as many, each moves little at both steps, and both together are the whole step."""
+    """True if the three sets are of one size, moves are small, and matching in two steps or in one agrees."""
     if not len(before) == len(between) == len(after):
         return False
     first, second, whole = (_becomes(*two) for two in ((before, between), (between, after), (before, after)))
@@ -290,28 +290,28 @@ def _is_clear(before: ComplexArray, between: ComplexArray, after: ComplexArray) 
 
 
 def _becomes(before: ComplexArray, after: ComplexArray) -> Array:
-    """Places in a set of as many of what each eigenvalue becomes."""
+    """Index in `after` of the match of each eigenvalue in `before`; the sets have one size."""
     rows, columns = _pairs(before, after)
     return np.asarray(columns[np.argsort(rows)])
 
 
 def _gaps(roots: ComplexArray) -> Array:
-    """Distance of each to the nearest other one that is not the same."""
+    """Distance of each root to the nearest other root, copies of a double root excepted."""
     apart = np.abs(roots[:, None] - roots)
     apart[apart <= _SAME * np.abs(roots)] = np.inf
     return np.asarray(np.min(apart, axis=1, initial=np.inf))
 
 
 def _origins(rig: Machine, name: str, values: Array, found: ComplexArray, numbers: Sequence[int]) -> tuple[Origin, ...]:
-    """Why oscillations grow, where they grow fastest in each stretch of values in which one does."""
+    """Reasons of growth, at the value of fastest growth in each interval of unstable values."""
     with np.errstate(invalid="ignore"):
         fastest = np.nanmax(np.where(np.isnan(found), -np.inf, found.real), axis=1)
     ends = np.flatnonzero(np.diff(np.concatenate([[False], fastest > 0, [False]]).astype(int)))
-    told = []
+    reasons = []
     for first, last in ends.reshape(-1, 2):
         at = first + int(np.argmax(fastest[first:last]))
         column = int(np.nanargmax(found[at].real))
         s = found[at, column]
         number = numbers[column] or int(np.sum(found[at].imag <= s.imag))
-        told.append(growth_origin(rig.with_values({name: float(values[at])}), complex(s), number))
-    return tuple(one for one in told if one is not None)
+        reasons.append(growth_origin(rig.with_values({name: float(values[at])}), complex(s), number))
+    return tuple(one for one in reasons if one is not None)

@@ -1,9 +1,10 @@
-"""What feeds a mode, and which two modes couple.
+"""Forces that feed energy into a mode, and pairs of modes that couple.
 
 With λ the eigenvalue, every force of the linearised machine does work on the mode's motion. Elastic and kinetic energy
-E grow at 2 Re λ E, so that the work of all other forces, over 2 E, adds up to the growth rate: exactly, force by force.
-What a contact's friction does is told apart: by what follows its slip (friction that falls with velocity feeds), and by
-what follows its normal force, which couples two modes: without damping their frequencies then meet (theory 11, 13).
+E grow at 2 Re λ E, so that the powers of all other forces, over 2 E, add up exactly to the growth rate. The power of a
+contact's friction is split into two parts: of friction that follows slip rate (it feeds energy if it falls with
+velocity), and of friction that follows the normal force, which couples two modes whose frequencies would meet without
+damping (theory 11, 13).
 """
 
 from __future__ import annotations
@@ -34,36 +35,36 @@ WORDS = {
 """Sentences on why an oscillation grows, by the kind of `Origin`."""
 BY_VELOCITY, BY_NORMAL = " by velocity", " by normal force"
 CONTROLLER = "drive.controller"
-_STEPS = 16  # of friction between none and the machine's own, through which the coupling pair is followed
-_MOST = 4.0  # times the machine's own friction up to which a meeting is looked for
-_ROUNDS, _LAST = 60, 4 * np.finfo(float).eps  # of regula falsi, and its last relative step
-_SAME = 1e-6  # relative difference of frequencies, and share of one, that counts as rounding of a double root
-_ALIKE = 0.5  # share of the largest feed from which another contact is told beside it
-_NEAR = 0.25  # share of its frequency by which a mode may be off that of the undamped pair which is taken for it
+_STEPS = 16  # steps of friction from none to the machine's own, through which the coupling pair is followed
+_MOST = 4.0  # largest multiple of the machine's friction up to which a meeting of frequencies is sought
+_ROUNDS, _LAST = 60, 4 * np.finfo(float).eps  # most steps of regula falsi, and relative size of its last step
+_SAME = 1e-6  # relative difference of frequencies that counts as rounding of a double root
+_ALIKE = 0.5  # share of the largest feed from which another contact is mentioned too
+_NEAR = 0.25  # largest relative difference of frequency between a mode and the undamped pair identified with it
 
 
 @dataclass(frozen=True)
 class Origin(Displayed):
-    """Why an oscillation grows; `words` says it.
+    """Reason why an oscillation grows; `words` is its text.
 
     Attributes
     ----------
     kind : str
         A key of `WORDS`.
     name : str
-        What feeds it most: a contact, or a dotted name.
+        Contact, or dotted name of another force, that feeds most energy into the mode.
     number : int
-        Of the mode, as `Mode.number`.
+        `Mode.number` of the mode.
     frequency : float
-        Of the mode, or where two modes meet (Hz).
+        Frequency (Hz) of the mode, or at which two modes meet.
     feeds : dict of str to float
-        Shares of the growth rate (1/s) by what does work on the mode; their sum is the growth rate.
+        Contributions to the growth rate (1/s) by name of the force; their sum is the growth rate.
     modes : tuple of int
-        Places by rising frequency of the two that meet; empty if none do.
+        Numbers by rising frequency of the two modes that meet; empty if none do.
     friction : float or None
-        Friction coefficient of the contact where they meet, those of all contacts raised or lowered alike.
+        Friction coefficient of the contact at which the modes meet, if friction of all contacts is scaled alike.
     others : int
-        Further contacts that feed it in the same way, each at least half as much.
+        Number of further contacts that feed the mode by the same mechanism, each at least half as much.
     """
 
     kind: str
@@ -97,7 +98,7 @@ class Origin(Displayed):
 
 
 def origin_of(point: MachinePoint, s: complex, number: int) -> Origin:
-    """Why the oscillation with the eigenvalue `s` (1/s) grows; `number` is its place by frequency."""
+    """Reason why the oscillation with the eigenvalue `s` (1/s) grows; `number` is its place by frequency."""
     feeds = feeds_of(point, s)
     most = max(feeds, key=lambda name: feeds[name])
     name, frequency = most.partition(".")[2], abs(s.imag) / (2 * np.pi)
@@ -119,7 +120,7 @@ def origin_of(point: MachinePoint, s: complex, number: int) -> Origin:
 
 
 def feeds_of(point: MachinePoint, s: complex) -> dict[str, float]:
-    """Shares of the growth rate Re `s` (1/s) by dotted name of what does work on the mode; springs do none."""
+    """Contributions to the growth rate Re `s` (1/s) by dotted name of the force; springs contribute none."""
     names, mechanism = point.matrices.names, point.machine.mechanism()
     state = point.pencil.mode(s)
     q: ComplexArray = state[: len(names)]
@@ -128,7 +129,7 @@ def feeds_of(point: MachinePoint, s: complex) -> dict[str, float]:
     energy = 0.25 * abs(s) ** 2 * _form(point.matrices.mass, q)
 
     def add(name: str, rate: Any, force: Any, held: float = 0.0) -> None:
-        """Add the work of a force on what moves at a rate, less what becomes elastic energy."""
+        """Add the power of a force at the velocity `rate`; `held` is the elastic energy that it stores."""
         nonlocal energy
         work[name] = work.get(name, 0.0) + 0.5 * float((np.conj(rate) * force).real) + 2 * s.real * held
         energy += held
@@ -147,7 +148,7 @@ def feeds_of(point: MachinePoint, s: complex) -> dict[str, float]:
         add(CONTROLLER, s * moved, -float(mechanism.integral.gain) * state[-1])
     start = 2 * len(names)
     for i, site in enumerate(point.matrices.sites):
-        answer = _Answer(point, i, s)
+        answer = _ContactResponse(point, i, s)
         width = len(site.laws.memory) + len(site.laws.states)
         inner = state[start + len(site.laws.memory) : start + width]
         start += width
@@ -164,8 +165,8 @@ def _form(matrix: Array, shape: ComplexArray) -> float:
     return float((shape.conj() @ matrix @ shape).real)
 
 
-class _Answer:
-    """Friction stress of a contact by slip rate and by normal stress, at one place s: τ = Z v + m σ (theory 13)."""
+class _ContactResponse:
+    """Response of a contact's friction to slip rate and normal stress at one s (1/s): τ = Z v + m σ (theory 13)."""
 
     def __init__(self, point: MachinePoint, i: int, s: complex) -> None:
         self.site: Site = point.matrices.sites[i]
@@ -186,7 +187,7 @@ class _Answer:
         return (free + n[4] * self.by_velocity * rate) / (1 - n[4] * self.by_normal)
 
     def undamped(self) -> tuple[float, Array, Array]:
-        """Re m, and rows of the normal stress with displacements and accelerations, without damping."""
+        """Re m, and derivatives of the normal stress by displacements and by accelerations (n,), without damping."""
         site, n = self.site, self.slopes.normal
         return float(self.by_normal.real), n[0] * site.slip + n[3] * site.pull + n[5] * site.apart, n[2] * site.slip
 
@@ -196,7 +197,7 @@ class _Undamped:
 
     def __init__(self, point: MachinePoint, s: complex) -> None:
         self.target, self.matrices = s, point.matrices
-        self.answers = [_Answer(point, i, 1j * abs(s.imag)) for i in range(len(point.matrices.sites))]
+        self.answers = [_ContactResponse(point, i, 1j * abs(s.imag)) for i in range(len(point.matrices.sites))]
 
     def squares(self, share: float) -> ComplexArray:
         """Values of λ² at a share of the friction."""
@@ -213,7 +214,7 @@ class _Undamped:
         return np.asarray(found[np.isfinite(found)])
 
     def _pair(self, share: float, near: complex) -> tuple[complex, float]:
-        """Middle of the two roots nearest to a place, and the square of half their distance: < 0 if complex."""
+        """Mean of the two roots λ² nearest to `near`, and the square of half their distance: < 0 for a complex pair."""
         found = self.squares(share)
         upper = found[(found.imag >= 0) & (found.real < 0)]
         if not upper.size:
@@ -229,7 +230,7 @@ class _Undamped:
         return complex(0.5 * (real[at] + real[at + 1])), float(0.25 * (real[at + 1] - real[at]) ** 2)
 
     def meeting(self) -> tuple[float, int, float] | None:
-        """Share of the friction at which the mode's pair meets, place of its first, and frequency (rad/s); or None."""
+        """Share of the friction at which the pair meets, number of its first mode, frequency (rad/s); None if none."""
         goal = complex(-(abs(self.target.imag) ** 2))
         middle, apart = self._pair(1.0, goal)
         steps = np.linspace(1.0, 0.0, _STEPS + 1)[1:] if apart < 0 else np.linspace(1.0, _MOST, 3 * _STEPS + 1)[1:]
@@ -253,7 +254,7 @@ class _Undamped:
         return found, int(np.sum((others > _SAME) & (others < 1 - _SAME))) + 1, where
 
     def _double(self, low: float, high: float, near: complex) -> float:
-        """Share of the friction in a bracket at which the two roots near a place become one, by regula falsi."""
+        """Share of the friction in a bracket at which the two roots near `near` are equal, by regula falsi."""
         below, above = self._pair(low, near)[1], self._pair(high, near)[1]
         share = low
         for _ in range(_ROUNDS):

@@ -1,4 +1,4 @@
-"""`modes`: all modes of a machine, what feeds the one that grows, and what to change."""
+"""`modes`: all modes of a machine, the cause of growth, and the effect of changes."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import explain_absence, steady_machine
 
 ENDINGS = (".csv", ".html", *FIGURES)
-MOST = 8  # modes, and parameters, that are printed: those that grow, and those of most effect
-LEAST = 1e-3  # share of the largest below which work is not printed
+MOST = 8  # number of modes printed (rightmost first), and of parameters (largest effect first)
+LEAST = 1e-3  # contributions to the growth rate below this share of the largest are not printed
 
 
 @dataclass(frozen=True, repr=False)
@@ -43,14 +43,14 @@ class Modes(Displayed):
     ----------
     rig : Machine
     found : tuple of Mode
-        Of a pair of eigenvalues the one with β > 0.
+        Modes, for a pair of eigenvalues the one with β > 0.
     chosen : Mode
-        The mode that `origin` and `changes` are about: the first unless another was asked for.
+        Mode that `origin` and `changes` describe: the first unless another was requested.
     origin : Origin or None
-        Why that mode grows, if it is an oscillation that grows.
+        Reason why the chosen mode grows, if it is an oscillation that grows.
     changes : tuple of ModeChange
-        Slopes of its eigenvalue with every parameter, that of most effect on the growth rate first, and then with what
-        could be added at bodies, points and links. Empty with a delay.
+        Derivatives of the chosen mode's eigenvalue by every parameter, largest effect on the growth rate first, then by
+        springs, dampers and masses that could be added. Empty with a delay.
     """
 
     rig: Machine
@@ -70,11 +70,11 @@ class Modes(Displayed):
 
     @property
     def mode(self) -> Mode:
-        """The chosen mode, under the name that verdicts have for theirs."""
+        """The chosen mode; verdicts have an attribute of this name too."""
         return self.chosen
 
     def plot(self, kind: str | None = None, ax: Any = None) -> Any:
-        """A figure: ``"mode"``, amplitudes and energies of the chosen mode."""
+        """Figure of amplitudes and energies of the chosen mode; kind ``"mode"``."""
         return draw(self, kind, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
@@ -160,7 +160,7 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
     ----------
     rig : Machine
     number : int, optional
-        Of the oscillation, by rising frequency, that is looked at more closely. Unless given the mode that grows
+        Number by rising frequency of the oscillation that is examined in detail. By default the mode that grows
         fastest, or decays slowest.
 
     Returns
@@ -188,7 +188,7 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
     """
     rig = with_modes(rig)
     if by_matrices(rig):
-        steady_machine(rig)  # raises, and says which contact locks or lifts
+        steady_machine(rig)  # raises NoSteadySliding with the contact that locks up or lifts off
         own = machine_point(rig)
         found = tuple(matrix_mode(own, complex(s)) for s in own.pencil.eigenvalues if s.imag >= 0)
     else:
@@ -212,34 +212,34 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
 
 
 def with_modes(rig: Slider | Machine) -> Machine:
-    """The rig, which must be a machine; raises NotAvailable for a slider."""
+    """The rig itself if it is a machine; raises NotAvailable for a slider."""
     if isinstance(rig, Slider):
         raise NotAvailable("a slider is one body, which has no modes beside its eigenvalues; see analyze")
     return rig
 
 
 def growth_origin(rig: Machine, s: complex, number: int) -> Origin | None:
-    """Why the mode with the eigenvalue `s` (1/s) and a `Mode.number` grows.
+    """Reason why the mode with the eigenvalue `s` (1/s) and a `Mode.number` grows.
 
-    None if it does not oscillate or grow, with a delay, and where numbers find no steady state.
+    None if it does not oscillate or grow, with a delay, and if no numeric steady state is found.
     """
     point = _numeric_point(rig) if number and s.real > ON_THE_EDGE * abs(s) else None
     return None if point is None else origin_of(point, s, number)
 
 
 def _numeric_point(rig: Machine) -> MachinePoint | None:
-    """Steady sliding in numbers; None with a delay, and where Newton's method does not find it (very stiff links)."""
+    """Numeric steady sliding; None with a delay, and if Newton's method does not converge (very stiff links)."""
     point = machine_point(rig) if in_numbers(rig) else None
     return point if point is not None and not point.balance.problem and point.balance.exists else None
 
 
 def write_modes(found: Any, path: Path, source: Path | None = None) -> None:
-    """Write modes or their chart: columns, a document with the hash of its `source`, or a figure, by the ending.
+    """Write `Modes` or a `ModeChart` as CSV, HTML document (with the hash of its `source`) or figure, by the ending.
 
     Raises
     ------
     NotAvailable
-        If the ending is another one, or the file cannot be written.
+        If the ending is none of `ENDINGS`, or the file cannot be written.
     """
     writers = {".csv": found.to_csv, ".html": lambda p: write_page(found, p, "Modes", source=source)}
     write_by_ending(path, writers, found.plot, found)

@@ -32,10 +32,10 @@ WORDS = {
     "energy": "; {share} of the energy is in the {name}", "most": " most, of {count} coordinates",
     "unseen": "no named point moves",
 }  # fmt: skip
-"""Phrases of which `Mode.words` is made, singular|plural; the keys are used by pages too."""
-MOVES, HARDLY = 0.5, 0.1  # of the largest amplitude: from the first a body oscillates, below the second it hardly moves
-UNSEEN = 1e-9  # of the largest amplitude of a structure: points that move less stand still in a mode, to rounding
-MANY, NAMED = 8, 3  # coordinates above which a sentence names those that move most alone, and how many of them
+"""Phrases for `Mode.words`, singular|plural; pages use the same keys."""
+MOVES, HARDLY = 0.5, 0.1  # share of the largest amplitude from which a body oscillates; below which it hardly moves
+UNSEEN = 1e-9  # share of a structure's largest amplitude below which the motion of points is rounding error
+MANY, NAMED = 8, 3  # with more coordinates than MANY a sentence names only the NAMED ones that move most
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,13 @@ class Mode(Displayed):
     Attributes
     ----------
     eigenvalue : complex
-        1/s.
+        Eigenvalue, 1/s.
     amplitudes : dict of str to complex
-        Of every coordinate, as shares of the largest; a body that moves in steady sliding is measured by how far the
-        rigid motion of the machine would take it, so that motors and tables compare. Behind ``.normal``: away from
-        the surface.
+        Amplitude of every coordinate over the largest. Amplitudes of bodies that move in steady sliding are first
+        divided by the ratio of their speed to the drive's, so that motors and tables compare. Names that end in
+        ``.normal`` are motion away from the surface.
     kinetic, elastic : dict of str to float
-        Shares of the energy over a cycle, by dotted name of bodies, links and contacts; all of both make one.
+        Shares of the energy over a cycle, by dotted name of bodies, links and contacts; their total is one.
     number : int
         Place among the oscillations by rising frequency, from 1; 0 without oscillation.
     """
@@ -70,12 +70,12 @@ class Mode(Displayed):
 
     @property
     def frequency(self) -> float:
-        """Hz; 0 without oscillation."""
+        """Frequency in Hz; 0 without oscillation."""
         return abs(self.eigenvalue.imag) / (2 * np.pi)
 
     @property
     def damping_ratio(self) -> float:
-        """−Re λ/|λ|: negative if the mode grows."""
+        """Damping ratio −Re λ/|λ|; negative if the mode grows."""
         return -self.eigenvalue.real / abs(self.eigenvalue) if self.eigenvalue else 0.0
 
     def to_dict(self) -> dict[str, Any]:
@@ -142,7 +142,7 @@ class Mode(Displayed):
         return body + WORDS["way"].format(way=way) if way else body
 
     def _direction(self, body: str, leads: list[str], still: list[str]) -> str:
-        """Clause on the directions in which the one body that leads moves, and on the one in which it hardly does."""
+        """Clause on the directions in which the only oscillating body moves, and in which it hardly moves."""
         way = self._way(body, leads)
         hardly = WORDS["hardly_along"] if body in still else WORDS["hardly_away"] if body + NORMAL in still else ""
         return f" {way}{hardly}" if way else ""
@@ -206,7 +206,8 @@ def _number(s: complex, eigenvalues: ComplexArray) -> int:
 def _null_vector(matrix: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Null vector of a singular matrix; rows and columns of very different size are balanced first.
 
-    `sizes` are those of the terms of each entry: a row that the eigenvalue makes zero must not count by its rounding.
+    Balancing uses `sizes`, sums of absolute values of the terms of each entry, so that rounding error of a row whose
+    terms cancel at the eigenvalue is not amplified.
     """
     columns = np.ones(len(matrix))
     for _ in range(3):
@@ -219,7 +220,7 @@ def _null_vector(matrix: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 
 def matrix_mode(point: MachinePoint, s: complex) -> Mode:
-    """Mode of a machine given by matrices that belongs to the eigenvalue `s` (1/s): of bodies and of named points."""
+    """Mode, at bodies and named points, of a machine given by matrices that belongs to the eigenvalue `s` (1/s)."""
     machine, names = point.machine, point.matrices.names
     shape = point.pencil.mode(s)[: len(names)]
     places = dict(zip(names, shape, strict=True))
@@ -240,7 +241,7 @@ def matrix_mode(point: MachinePoint, s: complex) -> Mode:
 
 @dataclass(frozen=True)
 class EnergyStore:
-    """Something that holds energy: `weight` |amplitude of the row|², times |s|² where it is `kinetic`."""
+    """Energy of a body, link or contact: `weight` |amplitude along `row`|², times |s|² if it is `kinetic`."""
 
     name: str
     kinetic: bool
@@ -260,7 +261,7 @@ def stores(mechanism: Mechanism) -> list[EnergyStore]:
     for element in mechanism.elements:
         row = {n: c for n, c in element.senses.items() if n in names}
         beside = not element.delay and row == dict(element.acts)
-        if element.stiffness and (element.name or beside):  # a controller that sees where it acts is a spring, too
+        if element.stiffness and (element.name or beside):  # a controller that senses where it acts is a spring, too
             found.append(EnergyStore(element.name or "drive.controller", False, element.stiffness, row))
     for touch in mechanism.contacts:
         if touch.separation and touch.contact.is_compliant():

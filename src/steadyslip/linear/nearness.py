@@ -1,7 +1,7 @@
-"""How far one value of a parameter is from another, and which edges are next to it: one measure for all answers.
+"""Distance between values of a parameter, and nearest edges: one measure for verdicts, margins and pages.
 
-What doubles or halves a value is as far as any other change that does; a share of the value is no such measure: it
-never calls a hundredth of a value (-99 %) further than twice the value (+100 %).
+Distance is counted in doublings, so that half and twice a value are equally far. A relative difference would call a
+hundredth of a value (-99 %) nearer than twice the value (+100 %).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from steadyslip.core.arrays import Array
 
 
 def doublings(value: ArrayLike, other: ArrayLike, unit: str = "") -> Any:
-    """Doublings from one value to another; of angles the difference in radians.
+    """Number of doublings from one value to another; for angles the difference in radians.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ def doublings(value: ArrayLike, other: ArrayLike, unit: str = "") -> Any:
     Returns
     -------
     float or ndarray
-        Zero or positive. From or to zero it is 1, through zero 1 and the doublings from 1 to 1 + |other/value|; NaN
-        where a value is.
+        Zero or positive. From or to zero it is 1; for values of opposite sign 1 + log2(1 + |other/value|); NaN where a
+        value is NaN.
 
     Examples
     --------
@@ -47,15 +47,15 @@ def doublings(value: ArrayLike, other: ArrayLike, unit: str = "") -> Any:
 
 
 def nearest_end(ends: Array, own: ArrayLike, unit: str = "") -> Array:
-    """Index of the one of several values that is nearest to each own value, (...), by `doublings`.
+    """Index (...) of the end nearest to each own value by `doublings`.
 
-    Only the next on each side count, as whoever goes further passes these; of two as far the one at the smaller
-    difference.
+    Only the neighbours of the own value on either side are compared, as larger changes pass these first; of two equally
+    far ends the one with the smaller difference.
 
     Parameters
     ----------
     ends : ndarray (..., m)
-        In any order; NaN where there is none.
+        In any order; padded with NaN.
     own : array_like (...)
     unit : str
 
@@ -73,9 +73,9 @@ def nearest_end(ends: Array, own: ArrayLike, unit: str = "") -> Array:
 
 
 def ends_about(own: float, ends: Sequence[float], unit: str = "") -> tuple[float, ...]:
-    """The values next to an own one, below and above it, nearest first: two, one or none.
+    """Ends next to an own value, below and above it, nearest first: two, one or none.
 
-    An edge at the own value itself counts as above it, and is the only one told.
+    An end equal to the own value is returned alone.
     """
     beside = [*sorted(end for end in ends if end < own)[-1:], *sorted(end for end in ends if end >= own)[:1]]
     beside.sort(key=lambda end: (doublings(own, end, unit), abs(end - own)))

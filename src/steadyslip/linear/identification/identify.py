@@ -19,20 +19,20 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.model.numeric import has_response
 from steadyslip.model.numeric.pencil import ComplexArray
 
-_PROMINENT = 0.5  # natural logarithm by which a peak rises above its surroundings; noise of 10 % does not
-_DAMPED = 0.01  # damping ratio of poles to begin with; vector fitting moves them
-_BESIDE = 1.2  # times the end of the band, where a mode beyond it is sought
-_NOTHING = 1e-9  # of the largest response, below which one is taken for rounding
-_SMOOTHED = 9  # frequencies over which misfits are averaged to find where a mode is missing
-_EVALUATIONS = 40  # of the modes in the least squares: from vector fitting some five do
-_EXACT = 1e-22  # mean square misfit relative to the response, from which it is rounding
-_SURE = 4.0  # standard errors by which a mode is damped, or it is a few errors of the response that it follows
-_MOST_MODES = 40  # sought at most: bounds the time, as each further one takes two fits of all; tests resolve fewer
-_MOST_ENTRIES = 30_000_000  # of the table of derivatives: 240 MB
+_PROMINENT = 0.5  # least rise of ln|response| at a peak above its surroundings; noise of 10 % stays below
+_DAMPED = 0.01  # damping ratio of starting poles; vector fitting moves them
+_BESIDE = 1.2  # frequency over the end of the band at which a mode beyond it is tried
+_NOTHING = 1e-9  # share of the largest response below which a response counts as rounding error
+_SMOOTHED = 9  # number of frequencies over which misfits are averaged to find where a mode is missing
+_EVALUATIONS = 40  # most evaluations in least squares; from poles of vector fitting some five suffice
+_EXACT = 1e-22  # mean square misfit relative to the response below which it is rounding error
+_SURE = 4.0  # least damping of a mode in standard errors; less is a fit to a few errors of the response
+_MOST_MODES = 40  # bounds the time, as each further mode takes two fits of all; tests resolve fewer
+_MOST_ENTRIES = 30_000_000  # most entries of the table of derivatives: 240 MB
 _POOR = 3.0  # mean square of misfits over errors above which the modes do not describe the response
-_FAR = 1e100  # m/N, and its inverse: whose powers leave floating point
+_FAR = 1e100  # m/N; powers of responses beyond this, or below its inverse, leave floating point
 _OUT_OF_RANGE = "modes are not identified: the response leaves the range of numbers; check units"
-_COARSE = 1e-2  # the same over the response where errors are not told: 10 % of it
+_COARSE = 1e-2  # mean square of misfits over the response, for responses without errors, above which it is poor
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +50,14 @@ class IdentifiedModes(Displayed):
     names : tuple of str
         Points with directions: ``tip.x``.
     inside : ndarray of bool (k,)
-        Modes within the band; those beyond it stand for all that are there.
+        True for modes within the band; each of the others represents several modes beyond the band.
     misfit : float
-        Root mean square of what the modes leave, over the errors of the response (over the response where none are
-        told). Standard errors are multiplied by it where it is above one or errors are not told.
+        Root mean square residual over the errors of the response, or over the response if errors are not given.
+        Standard errors are multiplied by it if it is above one or errors are not given.
     total : ModalSum
+        Sum of the modes that was fitted.
     covariance : ndarray (n, n)
-        Of the unknowns of `total`.
+        Covariance of the unknowns of `total`.
     """
 
     frequency: Array
@@ -88,7 +89,7 @@ def identified_modes(machine: Machine) -> IdentifiedModes:
     Parameters
     ----------
     machine : Machine
-        With a structure given by its response.
+        Machine with a structure given by its response.
 
     Returns
     -------
@@ -103,7 +104,7 @@ def identified_modes(machine: Machine) -> IdentifiedModes:
     -----
     Poles common to all responses come from vector fitting (Gustavsen & Semlyen, IEEE Trans. Power Deliv. 14, 1999);
     they and the shapes of reciprocal modes are then refined by least squares, weighted by the errors of the response,
-    whose covariance gives standard errors. A mode is added as long as the criterion of Schwarz (Ann. Stat. 6, 1978)
+    and the covariance gives standard errors. Modes are added as long as the criterion of Schwarz (Ann. Stat. 6, 1978)
     falls.
 
     Examples
@@ -139,12 +140,13 @@ def identify(data: ResponseData) -> IdentifiedModes:
     """Modes that describe measured responses; see `identified_modes`."""
     known = _Known.of(data)
     try:
-        with np.errstate(all="ignore"):  # numbers far outside the range of any structure, refused here
+        with np.errstate(all="ignore"):  # overflow, for numbers far outside the range of structures, raises below
             total, square = known.described()
     except (np.linalg.LinAlgError, ValueError) as error:
         raise NotAvailable(_OUT_OF_RANGE) from error
-    if not square <= (_POOR if known.told else _COARSE):
-        rest = f"{math.sqrt(square):.3g} times its errors" if known.told else f"{100 * math.sqrt(square):.3g} % of it"
+    if not square <= (_POOR if known.has_errors else _COARSE):
+        size = 100 * math.sqrt(square)
+        rest = f"{math.sqrt(square):.3g} times its errors" if known.has_errors else f"{size:.3g} % of it"
         raise NotAvailable(f"no sum of reciprocal modes describes the response: what is left is {rest}")
     order = np.argsort(np.abs(total.poles))
     total = ModalSum(total.poles[order], total.shapes[order], total.rest)
@@ -153,7 +155,7 @@ def identify(data: ResponseData) -> IdentifiedModes:
 
 
 def _result(data: ResponseData, total: ModalSum, covariance: Array, misfit: float) -> IdentifiedModes:
-    """Frequencies, dampings and shapes with the errors that follow from the covariance of the unknowns."""
+    """Make the result: frequencies, damping ratios and shapes, with errors by propagation of the covariance."""
     size, poles = len(data.names), total.poles
     turn = np.sqrt(2j * poles.imag)
     shape, errors = turn[:, None] * total.shapes, np.empty((len(poles), 2 + size))
@@ -177,19 +179,19 @@ def _result(data: ResponseData, total: ModalSum, covariance: Array, misfit: floa
 
 @dataclass(frozen=True)
 class _Known:
-    """Responses (p, d, d) and their weights: one over the deviation of each part, zero where nothing was measured."""
+    """Responses (p, d, d) and weights: 1 over the standard deviation of real and imaginary part, 0 if not measured."""
 
     omega: Array
     response: ComplexArray
     weight: Array
-    told: bool
+    has_errors: bool
 
     @classmethod
     def of(cls, data: ResponseData) -> _Known:
-        """Where errors are not told anywhere, they are taken as a share of each response."""
+        """Responses and weights of measured data; data without errors get errors proportional to each response."""
         response, deviation = data.full
-        error, told = deviation / math.sqrt(2), bool(np.any(deviation))
-        if not told:  # a share of the larger of a response and those at its own places
+        error, has_errors = deviation / math.sqrt(2), bool(np.any(deviation))
+        if not has_errors:  # proportional to the response, or to the geometric mean of the direct ones if larger
             own = np.sqrt(np.abs(np.diagonal(response, axis1=1, axis2=2)))
             error = np.maximum(np.abs(response), np.nan_to_num(own[:, :, None] * own[:, None, :]))
         use = np.isfinite(response) & (error > 0)
@@ -198,20 +200,20 @@ class _Known:
         largest = float(np.max(np.abs(response[use])))
         if not 1 / _FAR < largest < _FAR:
             raise NotAvailable(_OUT_OF_RANGE)
-        return cls(data.omega, np.where(use, response, 0), np.where(use, 1 / np.where(use, error, 1), 0), told)
+        return cls(data.omega, np.where(use, response, 0), np.where(use, 1 / np.where(use, error, 1), 0), has_errors)
 
     @property
     def count(self) -> int:
-        """Real numbers that were measured."""
+        """Number of measured real numbers."""
         return 2 * int(np.count_nonzero(self.weight))
 
     @property
     def flat(self) -> tuple[ComplexArray, Array]:
-        """Responses and weights, (p, c)."""
+        """Responses and weights with one column per pair of directions, (p, c) each."""
         return self.response.reshape(len(self.omega), -1), self.weight.reshape(len(self.omega), -1)
 
     def described(self) -> tuple[ModalSum, float]:
-        """The sum of modes with the lowest criterion, and the mean square of what it leaves over the errors."""
+        """Sum of modes with the lowest criterion of Schwarz, and mean square of its residuals over the errors."""
         poles = relocated(self.omega, *self.flat, self._peaks())
         found, left = self._criterion(poles)
         while len(poles) < _MOST_MODES and found > -math.inf:
@@ -231,21 +233,21 @@ class _Known:
         return best, self._square(best)
 
     def _sure(self, total: ModalSum) -> Array:
-        """True (k,) for modes beyond the band, and for those in it whose damping is larger than its errors."""
+        """True (k,) for modes beyond the band, and for modes in it whose damping exceeds `_SURE` standard errors."""
         size = 2 + 2 * total.shapes.shape[1]
         error = np.sqrt(np.maximum(np.diag(self.covariance(total)), 0))[: size * len(total.poles) : size]
         return np.asarray((total.poles.imag > self.omega[-1]) | (-total.poles.real > _SURE * error))
 
     def covariance(self, total: ModalSum) -> Array:
-        """Of the unknowns (n, n), for errors as told; where none are, or the modes leave more, for what they leave."""
+        """Covariance of the unknowns (n, n), from given errors; from residuals if larger, or if there are no errors."""
         rows = self.rows(total)
         sizes = np.linalg.norm(rows, axis=0)
         found = np.linalg.pinv((rows / sizes).T @ (rows / sizes), hermitian=True) / np.outer(sizes, sizes)
         square = self._square(total)
-        return np.asarray(found * (max(square, 1.0) if self.told else square))
+        return np.asarray(found * (max(square, 1.0) if self.has_errors else square))
 
     def _criterion(self, poles: ComplexArray) -> tuple[float, Array]:
-        """Criterion of Schwarz for any residues at poles, −inf at rounding, and squares (p,) of what is left."""
+        """Criterion of Schwarz for best residues at given poles, −inf for an exact fit; and squared residuals (p,)."""
         found, rest = residues(self.omega, *self.flat, poles)
         near, far = (1 / (1j * self.omega[:, None] - one) for one in (poles, poles.conj()))
         response, weight = self.flat
@@ -267,8 +269,8 @@ class _Known:
         return np.asarray(places * (1j - _DAMPED))
 
     def _begin(self, poles: ComplexArray) -> ModalSum:
-        """Modes at poles, with the shapes nearest to their residues; beyond the band, where a pole stands for several
-        modes, as many as there are directions."""
+        """Starting modes at poles, with shapes by rank-one fits to the residues; beyond the band a pole represents
+        several modes, and gets one for each direction."""
         size = self.response.shape[1]
         found, rest = residues(self.omega, *self.flat, poles)
         modes = []
@@ -280,7 +282,7 @@ class _Known:
         return ModalSum(table[:, 0], table[:, 1:], 0.5 * (square + square.T))
 
     def _refined(self, begin: ModalSum) -> ModalSum:
-        """Least squares from there."""
+        """Sum of modes refined by nonlinear least squares from the start `begin`."""
         from scipy.optimize import least_squares  # slow to import
 
         count, size = begin.shapes.shape
@@ -297,18 +299,18 @@ class _Known:
         return ModalSum.from_unknowns(found.x, count, size)
 
     def _resolved(self, poles: ComplexArray) -> bool:
-        """True if no mode in the band is narrower than the distance of the samples there, as single errors are."""
+        """True if every mode in the band is wider than the spacing of samples; fits to single errors are narrower."""
         inside = poles[poles.imag < self.omega[-1]]
         at = np.clip(np.searchsorted(self.omega, inside.imag), 1, len(self.omega) - 1)
         return bool(np.all(-2 * inside.real > self.omega[at] - self.omega[at - 1]))
 
     def _left(self, total: ModalSum) -> Array:
-        """What the modes leave, over its errors, (2 p d d,)."""
+        """Residuals over errors, real parts then imaginary parts, (2 p d d,)."""
         off = ((total(1j * self.omega) - self.response) * self.weight).ravel()
         return np.concatenate([off.real, off.imag])
 
     def rows(self, total: ModalSum) -> Array:
-        """Its derivatives by the unknowns, (2 p d d, n)."""
+        """Derivatives of the residuals by the unknowns, (2 p d d, n)."""
         slopes = total.derivatives(1j * self.omega) * self.weight[..., None]
         flat = slopes.reshape(-1, slopes.shape[-1])
         return np.concatenate([flat.real, flat.imag])
@@ -318,6 +320,6 @@ class _Known:
         return float(np.sum(self._left(total) ** 2)) / free
 
     def _worst(self, left: Array) -> float:
-        """Frequency near which most is left."""
+        """Frequency (rad/s) near which the squared residuals `left` (p,) are largest."""
         smooth = np.convolve(left, np.ones(_SMOOTHED) / _SMOOTHED, "same")
         return float(max(self.omega[np.argmax(smooth)], self.omega[1]))

@@ -12,7 +12,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
 from steadyslip.model.numeric.pencil import ComplexArray
 
-_NEWTON, _LAST, _STEP = 30, 1e-12, 1e-7  # steps, relative size of the last, and of differences: the root of rounding
+_NEWTON, _LAST, _STEP = 30, 1e-12, 1e-7  # most Newton steps, relative size of the last; of differences, ~sqrt(eps)
 
 
 @dataclass(frozen=True)
@@ -24,13 +24,13 @@ class WithError:
 
 
 class ModalMachine:
-    """A machine in identified modes, det(I + R G) with R their sum."""
+    """A machine whose structure is its identified modes: roots of det(I + R G), R the modal receptance, G contacts."""
 
     def __init__(self, measured: MeasuredMachine, modes: IdentifiedModes) -> None:
         self.measured, self.modes = measured, modes
 
     def varied(self, name: str, value: float) -> ModalMachine:
-        """The machine with another value (SI) of a parameter, which is not checked."""
+        """Copy of the machine with another value (SI) of a parameter, which is not checked."""
         return ModalMachine(self.measured.varied(name, value), self.modes)
 
     def roots(self) -> ComplexArray:
@@ -46,7 +46,7 @@ class ModalMachine:
         return np.asarray(found[np.argsort(-found.real)])
 
     def _pencil(self, unit: float) -> tuple[ComplexArray, ComplexArray]:
-        """A and E of modes, contacts' displacements, their velocities, forces and memories, in time units 1/`unit`."""
+        """A and E of the pencil A − s E, for modes and contacts, with time in units of 1/`unit`."""
         contacts, total = self.measured.contacts, self.modes.total
         size, rows = contacts.size, self.measured.rows
         held = rows[:, self.measured.used] @ total.shapes[:, self.measured.used].T
@@ -69,7 +69,7 @@ class ModalMachine:
         return a * scale[:, None], e * scale[:, None]
 
     def _inner(self, s: complex) -> ComplexArray:
-        """I + R G at s."""
+        """Matrix I + R G at s (1/s)."""
         found = self.measured.seen(self._receptance(s)[None]) @ self.measured.contacts(np.array([s]))
         return np.asarray(np.eye(self.measured.contacts.size) + found[0])
 
@@ -78,7 +78,7 @@ class ModalMachine:
         return np.asarray(self.modes.total(np.array([s]))[0][np.ix_(used, used)])
 
     def _by_unknowns(self, s: complex) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Null vectors of I + R G at a root, and the derivatives of what is between them by the modes' unknowns."""
+        """Null vectors y, x of I + R G at a root, and derivatives of y (R G) x by the modes' unknowns, (n,)."""
         left, _, right = np.linalg.svd(self._inner(s))
         y, x = left[:, -1].conj(), right[-1].conj()
         used = self.measured.used
@@ -130,7 +130,7 @@ class ModalMachine:
 
 
 def _solved(first: complex, second: complex, right: complex | ComplexArray) -> Array | None:
-    """Real a, b with a first + b second = right; None if they are parallel."""
+    """Real a, b with a first + b second = right; None if `first` and `second` are parallel."""
     rows = np.array([[first.real, second.real], [first.imag, second.imag]])
     try:
         return np.asarray(np.linalg.solve(rows, np.array([np.real(right), np.imag(right)])))
@@ -139,7 +139,7 @@ def _solved(first: complex, second: complex, right: complex | ComplexArray) -> A
 
 
 def modal_machine(machine: Machine) -> ModalMachine:
-    """The machine in the modes identified from its response.
+    """Machine whose structure is the modes identified from its response.
 
     Raises
     ------

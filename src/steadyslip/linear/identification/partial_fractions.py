@@ -21,11 +21,11 @@ class ModalSum:
     Attributes
     ----------
     poles : ndarray (k,)
-        Above the real axis, 1/s.
+        Poles with positive imaginary part, 1/s.
     shapes : ndarray (k, d)
-        u, whose products are the residues (m/(N s)).
+        Vectors u; the residues are u uᵀ, m/(N s).
     rest : ndarray (d, d)
-        D, symmetric (m/N).
+        Symmetric matrix D, m/N.
     """
 
     poles: ComplexArray
@@ -34,7 +34,7 @@ class ModalSum:
 
     @classmethod
     def from_unknowns(cls, unknowns: Array, count: int, size: int) -> ModalSum:
-        """The sum of `count` modes in `size` directions with these unknowns."""
+        """Sum of `count` modes in `size` directions with the given real unknowns (n,)."""
         modes = unknowns[: count * (2 + 2 * size)].reshape(count, 1 + size, 2) @ np.array([1, 1j])
         rest = np.zeros((size, size))
         rest[np.triu_indices(size)] = unknowns[count * (2 + 2 * size) :]
@@ -42,20 +42,20 @@ class ModalSum:
 
     @property
     def unknowns(self) -> Array:
-        """The real unknowns, (n,)."""
+        """Real unknowns, (n,), in the order described in the module."""
         modes = np.concatenate([self.poles[:, None], self.shapes], axis=1)
         own = np.stack([modes.real, modes.imag], axis=-1).ravel()
         return np.concatenate([own, self.rest[np.triu_indices(len(self.rest))]])
 
     def __call__(self, s: ComplexArray) -> ComplexArray:
-        """Receptance (p, d, d) at places s (p,)."""
+        """Receptance (p, d, d) in m/N at s (p,) in 1/s."""
         residues = self.shapes[:, :, None] * self.shapes[:, None, :]
         found = np.tensordot(1 / (s[:, None] - self.poles), residues, 1)
         found = found + np.tensordot(1 / (s[:, None] - self.poles.conj()), residues.conj(), 1)
         return np.asarray(found + self.rest)
 
     def derivatives(self, s: ComplexArray) -> ComplexArray:
-        """Derivatives (p, d, d, n) of the receptance at places s (p,) by the unknowns."""
+        """Derivatives (p, d, d, n) of the receptance at s (p,) by the unknowns."""
         size = self.shapes.shape[1]
         one, columns = np.eye(size), []
         for pole, shape in zip(self.poles, self.shapes, strict=True):

@@ -1,7 +1,7 @@
 """Poles common to several responses by vector fitting (Gustavsen & Semlyen 1999, relaxed as by Gustavsen 2006).
 
-Starting poles for the least squares that follow: weights are those of the errors, but the poles themselves are biased
-by noise, as each step is a linear problem.
+Starting poles for nonlinear least squares. Residuals are weighted by the errors, but noise biases the poles, as each
+step is a linear problem.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.model.numeric.pencil import ComplexArray
 
-_STEPS = 8  # of relocation; from peaks a few do
+_STEPS = 8  # relocations of poles; from peaks a few suffice
 
 
 def relocated(omega: Array, responses: ComplexArray, weights: Array, poles: ComplexArray) -> ComplexArray:
-    """Poles above the real axis after some relocations, for responses and weights (p, c) at omega (p,)."""
+    """Poles (1/s) above the real axis after `_STEPS` relocations, for responses and weights (p, c) at omega (p,)."""
     for _ in range(_STEPS):
         poles = _once(omega, responses, weights, poles)
         if not poles.size:
@@ -46,7 +46,7 @@ def _real(rows: ComplexArray) -> Array:
 
 
 def _once(omega: Array, responses: ComplexArray, weights: Array, poles: ComplexArray) -> ComplexArray:
-    """Zeros of Σ c/(s − p) + d that makes the products with the responses a sum over the same poles."""
+    """Relocated poles: zeros of the Σ c/(s − p) + d whose product with each response is a sum over the poles p."""
     basis = _basis(1j * omega, poles, True)
     count = basis.shape[1]
     kept = []

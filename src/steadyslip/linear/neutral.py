@@ -1,12 +1,12 @@
-"""Highest power of s under delays: whether it can vanish right of the imaginary axis, and how small it can be there.
+"""Coefficient of the highest power of s under delays: zeros right of the imaginary axis, and lower bounds there.
 
-Of Σ p_j(s) exp(−s h_j) the highest power is multiplied by Σ c_j exp(−s h_j). Each h_j is the sum of a set of delays
-τ_i, so that this is P(x) = Σ c_j Π x_i with x_i = exp(−s τ_i), in which no x_i occurs twice in a term. If P vanishes
-for some |x_i| <= 1, then for delays as near as one likes to the given ones infinitely many roots lie right of the axis
-or as close to it as one likes: the equations are ill-posed (strong stability of neutral equations, Hale & Verduyn Lunel
-1993, section 9.6). Where the delayed terms are together smaller than the one without delay, P does not vanish. The
-converse holds unless terms are products: of two alike bodies, P = (1 + b x)(1 + b y) vanishes for |b| >= 1, not for
-|b| > 0.41.
+In Σ p_j(s) exp(−s h_j) the highest power has the coefficient Σ c_j exp(−s h_j). Each h_j is the sum of a set of delays
+τ_i, so that the coefficient is P(x) = Σ c_j Π x_i with x_i = exp(−s τ_i), in which no x_i occurs twice in a term. If P
+vanishes for some |x_i| <= 1, then for delays arbitrarily near the given ones infinitely many roots lie right of the
+axis or arbitrarily close to it: the equations are ill-posed (strong stability of neutral equations, Hale & Verduyn
+Lunel 1993, section 9.6). P does not vanish if the delayed terms together are smaller than the term without delay. The
+converse is true unless terms are products: for two equal bodies P = (1 + b x)(1 + b y) vanishes for |b| >= 1, not
+already for |b| > 0.41.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from steadyslip.linear.roots import Array, ComplexArray, quietly
 Sets = NDArray[np.bool_]
 """Table (m, d): True where term j is delayed by delay i."""
 _SWEEPS = 30  # rounds over all delays; by trial: the smallest value found changes by less than 1e-6 in the last
-_STARTS = 24  # sets of phases from which P is made smaller, beside all of 0 and π, where it is real
-_SETTLED = 1e-9  # relative change in a round below which the smallest value has been found
-_SURE = 0.5  # share of the smallest value found that is used as a lower bound: another start could find a smaller one
-_STEPS = 257  # places between x = 0 and its value at which the argument of P is followed
+_STARTS = 24  # random starts of the minimisation of |P|, beside all combinations of phases 0 and π, where P is real
+_SETTLED = 1e-9  # relative change in a round below which the minimum has converged
+_SURE = 0.5  # share of the smallest value found that is used as lower bound: another start might find a smaller one
+_STEPS = 257  # points between 0 and x at which the argument of P is followed
 
 
 def highest(c: Array) -> tuple[Array, NDArray[np.int64]]:
@@ -35,7 +35,7 @@ def highest(c: Array) -> tuple[Array, NDArray[np.int64]]:
 
 
 def leads(c: Array) -> NDArray[np.bool_]:
-    """True (rows,) where of the highest power the term without delay is larger than the others together.
+    """True (rows,) where at the highest power the term without delay is larger than all others together.
 
     For coefficients c (rows, m, n+1).
     """
@@ -47,10 +47,10 @@ def leads(c: Array) -> NDArray[np.bool_]:
 def least_size(c: Array, sets: Sets) -> Array:
     """Lower bound (rows,) of |P| for all |x_i| <= 1, with coefficients c (rows, m) of P; 0 or less if P vanishes.
 
-    It is exact for two terms. Where delayed terms outweigh the other and some are products, P is made smaller in each
-    x_i by turns, from many starts: as P is linear in each, P = A + B x_i, it vanishes if |B| >= |A| anywhere, and else
-    is smallest on |x_i| = 1. For two delays it is certain that a zero is found: |A|² − |B|² is linear in the cosine of
-    the phase of the other, so that signs at ±1 decide.
+    It is exact for two terms. If delayed terms exceed the undelayed one and some are products, |P| is minimised in one
+    x_i after the other, from many starts: P is linear in each, P = A + B x_i, so that it vanishes if |B| >= |A|
+    anywhere, and is else smallest on |x_i| = 1. For two delays a zero is found with certainty: |A|² − |B|² is linear in
+    the cosine of the other phase, so that its signs at ±1 decide.
     """
     found = np.asarray(np.abs(c[:, 0]) - np.sum(np.abs(c[:, 1:]), axis=-1))
     several = np.any(c[:, np.sum(sets, axis=1) > 1] != 0, axis=-1)
@@ -92,9 +92,9 @@ def _signs(count: int) -> Array:
 
 
 def corners(sets: Sets) -> Array:
-    """Products of x_i in each term where all x_i are 1 or −1, (m, 2^d).
+    """Products of x_i in each term for all combinations of x_i = 1 or −1, (m, 2^d).
 
-    If dampings are mutual, P first vanishes at one of them as delayed terms grow.
+    If dampings are reciprocal, P first vanishes at one of these combinations as delayed terms grow.
     """
     return np.asarray(np.prod(np.where(sets[:, None, :], _signs(sets.shape[1]), 1.0), axis=-1))
 
@@ -122,7 +122,7 @@ def bound_on_axis(c: Array, sets: Sets) -> Array:
 
 
 def argument_at(c: Array, h: Array, sets: Sets, omega: Array) -> tuple[ComplexArray, Array]:
-    """P at x_i = exp(−iω τ_i), and its argument beside that of P(0), (rows,), followed from x = 0.
+    """P at x_i = exp(−iω τ_i), and its argument minus that of P(0) (rad), followed from x = 0; (rows,) each.
 
     For coefficients c (rows, m) of P, which must not vanish for |x_i| <= 1, delays h (rows, m) of its terms and ω
     (rows,). Where terms are products, the argument may be larger than π.

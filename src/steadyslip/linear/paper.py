@@ -2,7 +2,7 @@
 
 *Stability of sliding frictional surfaces with varying normal force*, J. Vib. Acoust. 116. Where the printed
 equation is wrong, the function is right and its docstring says what is printed. All functions take
-numbers or arrays that broadcast, in SI units per unit area, and return the same.
+and return numbers, or arrays that broadcast, in SI units per unit area.
 
 Symbols of eqs 17-21 (argument names in brackets): f = ∂τ/∂v [f], f1 = ∂τ/∂σ [f1], λ with
 dτss/dv = −λf [lam], λ1 with dτss/dσ = λ1 f1 [lam1], decay rate r [r], mass m [m], B0...B3 of eq. 12,

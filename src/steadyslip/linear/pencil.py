@@ -1,11 +1,11 @@
 """Eigenvalues with error bounds from the characteristic matrix itself, without a characteristic polynomial.
 
 M(s) x = 0, with M a polynomial in s whose entries are slopes of the Model's equations (`characteristic_rows`), is the
-machine's matrix pencil; delays add factors exp(−s h). An eigenvalue that was found by another route is checked by the
-least singular value of M(s), in units in which rows and columns are alike, over what M(s) changes with s: how far the
-eigenvalue of that matrix is, rounding of its entries included. Whether all are there is asked of the determinant along
-the imaginary axis, whose argument must turn as that of Π(s − s_i) does; with delays, of the argument principle itself.
-What fails is computed anew with many digits, from the eigenvalues of the same matrix; with delays by Newton's method.
+machine's matrix pencil; delays add factors exp(−s h). The error of an eigenvalue found by another route is the least
+singular value of M(s) (rows and columns scaled to equal size, rounding of entries added) over the change of M(s) with
+s. Completeness is checked by the determinant along the imaginary axis, whose argument must turn as that of Π(s − s_i)
+does; with delays, by the argument principle. Eigenvalues that fail are computed with many digits, from the eigenvalues
+of M(s); with delays by Newton's method.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, delays_in_terms, delays_of, quasipolynomial
 
 GOOD = 1e-6
-"""Share of an eigenvalue that its error may be; beyond it the eigenvalue is computed anew with many digits."""
+"""Largest accepted relative error of an eigenvalue; with a larger error it is computed again with many digits."""
 _NOISE = np.finfo(float).eps
-_LAST = 8 * _NOISE  # relative rounding of what a few operations make of the machine's numbers
-_BESIDE = 1 + 64 * _NOISE  # times an eigenvalue: a place beside it, where a double one has a slope as well
-_FIRST = 2.0  # times an error to first order: what others nearby may add
-_TRIALS = 4  # of other last digits of the machine's numbers, which exp(−(v/v_s)²), say, makes the more of
-_ALIKE = 100.0  # times the least singular value of a matrix, its rounding included, up to which others vanish with it
-_SWEEPS = 3  # of rows and columns towards one size
-_APART = 0.3  # rad by which the argument of the determinant may be off at a place; a lost eigenvalue makes more than 1
-_PLACES = 3  # on the axis, for each eigenvalue
+_LAST = 8 * _NOISE  # relative rounding error after a few operations on the machine's parameters
+_BESIDE = 1 + 64 * _NOISE  # factor on an eigenvalue: dM/ds is taken slightly beside it, for double eigenvalues
+_FIRST = 2.0  # safety factor on errors to first order, for the effect of nearby eigenvalues
+_TRIALS = 4  # copies with perturbed last digits of parameters, which exp(−(v/v_s)²), for example, amplifies
+_ALIKE = 100.0  # ratio to the least singular value up to which other singular values count as vanishing too
+_SWEEPS = 3  # alternate scalings of rows and columns to equal size
+_APART = 0.3  # largest error (rad) of the determinant's argument at a frequency; a lost eigenvalue makes more than 1
+_PLACES = 3  # frequencies on the axis for each eigenvalue
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +51,15 @@ class CheckedSpectrum:
         1/s, by falling real part, without those that do not exist; with delays the rightmost. Empty without steady
         sliding and where the numbers leave the range of floating point.
     errors : ndarray (n,)
-        1/s: by how much each may be wrong, rounding of the machine's numbers in their last digit included. A double
+        Bounds of the errors (1/s), rounding of the machine's parameters in their last digit included. A double
         eigenvalue has an error of about its size times 1e-8, a triple one of 1e-5. inf where nothing is known.
     growing : int
-        How many have a positive real part, by the argument principle; −1 where that was not to be decided.
+        Number of eigenvalues with positive real part, by the argument principle; −1 if it could not be determined.
     complete : bool
-        Whether that is the number of those in `values` which grow, those within their error of the imaginary axis
-        counted on either side.
+        True if `values` has `growing` eigenvalues with positive real part; those closer to the imaginary axis than
+        their error may count on either side.
     refined : bool
-        Whether they were computed with many digits, because the usual route did not pass.
+        True if the eigenvalues were computed with many digits, because those of double precision failed the checks.
     """
 
     values: ComplexArray
@@ -70,14 +70,14 @@ class CheckedSpectrum:
 
     @property
     def decided(self) -> bool:
-        """Whether every eigenvalue is known to a millionth of it or is one of several within their error, and none is
-        missing."""
+        """True if no eigenvalue is missing and each has a relative error of at most `GOOD`, or coincides with others
+        within its error."""
         return self.complete and bool(np.all(_is_good(self.values, self.errors)))
 
 
 @cached
 def checked_spectrum(point: OperatingPoint) -> CheckedSpectrum:
-    """Eigenvalues (1/s) of a single rig, each with an error, and whether the argument principle finds as many growing.
+    """Eigenvalues (1/s) of a single rig with error bounds, checked for completeness by the argument principle.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def checked_spectrum(point: OperatingPoint) -> CheckedSpectrum:
 
 
 def _by_newton(point: OperatingPoint, first: CheckedSpectrum) -> tuple[ComplexArray, Array]:
-    """Eigenvalues under delays and their errors, those not known well enough computed with many digits."""
+    """Eigenvalues under delays and their errors (1/s); those with too large an error are computed with many digits."""
     values, errors = first.values.copy(), first.errors.copy()
     last = 1 + _LAST * np.random.default_rng(0).choice([-0.5, 0.5], (_TRIALS, len(point.arguments)))
     others = [point.with_arguments([a * own for a, own in zip(point.arguments, row, strict=True)]) for row in last]
@@ -126,14 +126,14 @@ def _by_newton(point: OperatingPoint, first: CheckedSpectrum) -> tuple[ComplexAr
 def _checked(
     point: OperatingPoint, matrix: _Matrix, values: ComplexArray, errors: Array, refined: bool
 ) -> CheckedSpectrum:
-    """Spectrum with its completeness: as many eigenvalues grow as are counted by an independent route.
+    """Make the CheckedSpectrum: it is complete if as many eigenvalues grow as an independent method counts.
 
-    Under delays that is the argument principle; else none may be missing, and those that grow are counted in the list.
+    Under delays that method is the argument principle; without delays the determinant shows that none is missing.
     """
     surely, perhaps = (int(np.sum(values.real > edge * errors)) for edge in (1, -1))
     if point.model.delays:
         growing = _count(point)
-        some = len(values) if growing > len(values) else growing  # the list ends before all that grow are in it
+        some = len(values) if growing > len(values) else growing  # `values` may be shorter than the number that grows
         return CheckedSpectrum(values, errors, growing, growing >= 0 and surely <= some <= perhaps, refined)
     complete = refined or matrix.has_all(values)
     return CheckedSpectrum(values, errors, int(np.sum(values.real > 0)) if complete else -1, complete, refined)
@@ -149,7 +149,7 @@ def _is_good(values: ComplexArray, errors: Array) -> NDArray[np.bool_]:
 
 def _count(point: OperatingPoint) -> int:
     """Number of growing roots by the argument principle; −1 where counting takes too long."""
-    if len(point.model.delays) > 1:  # counted so anyway
+    if len(point.model.delays) > 1:  # `counts` uses the argument principle then
         return max(int(counts(point)), -1)
     (c, h), sets = quasipolynomial(point), delays_in_terms(point.model)
     with np.errstate(all="ignore"):
@@ -160,7 +160,7 @@ def _count(point: OperatingPoint) -> int:
 
 
 def _coefficient_errors(point: OperatingPoint, s: ComplexArray) -> Array:
-    """Change of eigenvalues `s` (1/s) by the last digits of the polynomial's coefficients; zero without polynomial."""
+    """Change of eigenvalues `s` (1/s) by the last digits of polynomial coefficients; 0 if there is no polynomial."""
     if not is_written_out(point.model):
         return np.zeros(len(s))
     c, moved = characteristic(point), characteristic(_retold(point))
@@ -182,8 +182,8 @@ def _retold(point: OperatingPoint) -> OperatingPoint:
 
 @dataclass(frozen=True, eq=False)
 class _Matrix:
-    """M(s) of one rig: the coefficients (n, n, k) before each product of a power of s and of exp(−s delay), and how far
-    the last digits of the rig's numbers move them."""
+    """M(s) of one rig: powers of s and delays (k,), coefficients `entries` (n, n, k) of the products s^power
+    exp(−s delay), and errors `wrong` (n, n, k) of the coefficients by the last digits of the parameters."""
 
     powers: Array
     late: Array
@@ -209,9 +209,9 @@ class _Matrix:
         return bool(np.all(np.isfinite(self.entries)))
 
     def even(self, s: ComplexArray) -> tuple[ComplexArray, Array, ComplexArray]:
-        """M at places (p,), how wrong its entries may be, and dM/ds, (p, n, n) each; rows and columns of one size."""
+        """M at s (p,), errors of its entries, and dM/ds, (p, n, n) each; rows and columns scaled to equal size."""
         place, top = s[:, None], np.max(self.powers)
-        size = np.maximum(np.abs(place), 1.0)  # all is divided by its highest power, which may leave floating point
+        size = np.maximum(np.abs(place), 1.0)  # divide by its highest power, which may leave floating point
         unit, late = place / size, np.exp(-place * self.late)
         factor = unit**self.powers * size ** (self.powers - top) * late
         lower = np.maximum(self.powers - 1, 0)
@@ -285,6 +285,6 @@ def _spread(s: ComplexArray, errors: Array) -> Array:
 
 @cached
 def matrix_function(model: Model) -> tuple[list[tuple[int, ...]], ArrayFunction]:
-    """Powers of s and of exp(−s delay) in the characteristic matrix, and of every entry what stands before each."""
+    """Powers of s and exp(−s delay) in the characteristic matrix, and array function of every entry's coefficients."""
     powers, entries = matrix_entries(model)
     return powers, model.function(entries)

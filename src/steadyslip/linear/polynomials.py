@@ -49,7 +49,7 @@ def damping_measures(s: ComplexArray) -> Array:
 def is_hurwitz(c: Array, spare: ArrayLike) -> NDArray[np.bool_]:
     """True where all roots have negative real parts (Routh) and the equations are well posed, (...).
 
-    They are not where the highest coefficient is negative, or more than `spare` (...) of the highest are 0.
+    Equations are ill-posed if the highest coefficient is negative, or more than `spare` (...) of the highest are 0.
     """
     n = c.shape[-1] - 1
     flat = c.reshape(-1, n + 1)
@@ -63,9 +63,9 @@ def is_hurwitz(c: Array, spare: ArrayLike) -> NDArray[np.bool_]:
 
 
 def _in_own_time(c: Array) -> Array:
-    """Polynomials whose coefficients lie far apart, for time in units in which lowest and highest are alike.
+    """Polynomials with time rescaled so that lowest and highest coefficients are alike, if coefficients lie far apart.
 
-    The Routh array of such a polynomial, and of its largest coefficient's size, would lose the least ones.
+    Without rescaling, the Routh array would lose the smallest coefficients.
     """
     size = np.abs(c)
     apart = np.min(size, axis=-1) < 1e-100 * np.max(size, axis=-1)
@@ -113,7 +113,7 @@ class StableSet:
     frequencies : ndarray (..., e)
         Angular frequency (1/s) at each edge: 0 divergence, inf ill-posed.
     changes : ndarray (..., e) of bool
-        Whether stability changes at the edge.
+        True if stability changes at the edge.
     searched : tuple of float
         Values of k between which the set is known; narrower under delays whose windows are too many.
     """
@@ -127,7 +127,7 @@ class StableSet:
 
 @quietly
 def stable_set(p: Array, q: Array, spare: ArrayLike) -> StableSet:
-    """The set of k > 0 for which p(s) + k q(s) has all roots in the left half plane.
+    """Set of k > 0 for which p(s) + k q(s) has all roots in the left half plane.
 
     Boundaries are k = −p(iβ)/q(iβ) at real roots β >= 0 of Im[p(iβ) conj q(iβ)] = 0, and the k where the
     highest coefficient vanishes; the intervals between them are tested (theory 3). Up to `spare` (...) of the highest
@@ -136,7 +136,7 @@ def stable_set(p: Array, q: Array, spare: ArrayLike) -> StableSet:
     p, q = np.broadcast_arrays(p, q)
     shape, n = p.shape[:-1], p.shape[-1] - 1
     p, q = p.reshape(-1, n + 1), q.reshape(-1, n + 1)
-    (p, of_p), (q, of_q) = _near_one(p), _near_one(q)  # products of what is left stay numbers
+    (p, of_p), (q, of_q) = _near_one(p), _near_one(q)  # products of scaled coefficients do not overflow
     k, beta = _candidates(p, q)
     order = np.argsort(np.where(np.isnan(k), np.inf, k), axis=-1)
     k, beta = np.take_along_axis(k, order, -1), np.take_along_axis(beta, order, -1)
@@ -162,7 +162,7 @@ def stable_set(p: Array, q: Array, spare: ArrayLike) -> StableSet:
 
 
 def _near_one(c: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Polynomials whose coefficients are all tiny or all huge over a power of two, and the exponents, (..., 1)."""
+    """Polynomials, divided by a power of two if all coefficients are tiny or huge; its exponents, (..., 1)."""
     sizes = np.abs(c)
     largest = np.max(sizes, axis=-1, keepdims=True)
     least = np.min(np.where(sizes > 0, sizes, np.inf), axis=-1, keepdims=True)
@@ -172,7 +172,7 @@ def _near_one(c: Array) -> tuple[Array, NDArray[np.intp]]:
 
 
 def _candidates(p: Array, q: Array) -> tuple[Array, Array]:
-    """Positive k at which a root may cross, and its β; NaN where there is none."""
+    """Positive k at which a root may cross the imaginary axis, and its β; padded with NaN."""
     with np.errstate(all="ignore"):
         static, top = crossing.real_edges(columns(p), columns(q))
     w = crossing_squares(p, q)
@@ -187,7 +187,7 @@ def _candidates(p: Array, q: Array) -> tuple[Array, Array]:
 
 
 def columns(c: Array) -> list[Array]:
-    """Coefficients of polynomials one by one, as `crossing` takes them."""
+    """List of coefficients (...), lowest power first, as functions of `crossing` take them."""
     return [c[..., i] for i in range(c.shape[-1])]
 
 

@@ -1,14 +1,14 @@
 """Quasi-polynomials Σ p_j(s) exp(−s h_j), and the number of their roots right of a line (theory 11).
 
 Coefficients are (..., m, n+1), lowest power first, delays (..., m) with h_0 = 0; the leading axes are rigs. `sets` (m,
-d) tells which delays of the rig make up each h_j. Nothing is
-approximated by rational functions. With one delay roots are counted from where they are without it: they cross the
-imaginary axis only at the few ω with |p(iω)| = |q(iω)|, at delays (φ + 2πk)/ω, to the right at the highest of these ω
-and then by turns (Cooke & van den Driessche 1986; Walton & Marshall 1987). With several delays the argument principle
-is applied along the axis (`argument`).
+d) is True for the delays of the rig whose sum is h_j. Nothing is approximated by rational functions. With one delay the
+count starts from the roots without delay: as the delay grows, roots cross the imaginary axis only at the few ω with
+|p(iω)| = |q(iω)|, at delays (φ + 2πk)/ω, to the right at the highest of these ω and then alternately to the left and
+right (Cooke & van den Driessche 1986; Walton & Marshall 1987). With several delays the argument principle is applied
+along the axis (`argument`).
 
-`INFINITE` is the count where the highest power of s can vanish (`neutral`): infinitely many roots lie to the right, the
-faster growing the shorter the delay; `UNKNOWN` where counting takes too long.
+The count is `INFINITE` where the highest power of s can vanish (`neutral`): infinitely many roots lie to the right,
+with growth rates that are larger the shorter the delay. It is `UNKNOWN` where counting takes too long.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from steadyslip.linear.roots import Array, evaluate, quietly, roots
 
 INFINITE = 2**62  # a count of roots, larger than any other
 _BATCH = 40  # rigs with several delays counted at a time; chosen by trial: memory against speed
-_MOST_PERIODS = 5000  # crossing delays are listed up to so many periods of the fastest; by trial: length of the list
+_MOST_PERIODS = 5000  # crossing delays are listed up to this many periods of the fastest crossing; by trial
 
 
 def value(c: Array, h: Array, s: Any) -> Any:
-    """Value Σ p_j(s) exp(−s h_j), of one rig for `s` of any shape, of rigs (rows, m, n+1) for `s` (rows, k)."""
+    """Value of Σ p_j(s) exp(−s h_j); for one rig `s` has any shape, for rigs (rows, m, n+1) the shape (rows, k)."""
     s = np.asarray(s, dtype=complex)
     return sum(evaluate(p, s) * np.exp(-s * delay) for p, delay in _terms(c, h))
 
@@ -56,7 +56,7 @@ def _terms(c: Array, h: Array) -> Iterator[tuple[Array, Array]]:
 
 @quietly
 def shifted(c: Array, h: Array, shift: Array) -> Array:
-    """Coefficients of the quasi-polynomial in s of which `c` gives the value at s + shift; `shift` (...)."""
+    """Coefficients of the quasi-polynomial whose value at s is that of `c` at s + `shift`; `shift` (...)."""
     out = np.array(np.broadcast_to(c, np.broadcast_shapes(c.shape, (*np.shape(shift), 1, 1))), dtype=float)
     step = np.asarray(shift, dtype=float)[..., None]
     n = c.shape[-1] - 1
@@ -159,7 +159,7 @@ def crossings(p: Array, q: Array) -> tuple[Array, Array, Array]:
 
 
 def _count_by_crossings(p: Array, q: Array, h: Array) -> NDArray[np.int64]:
-    """Number of roots of p + q exp(−sh) right of the axis: those at h = 0 plus those that cross as h grows."""
+    """Number of roots of p + q exp(−sh) right of the axis: number at h = 0 plus crossings as h grows."""
     start = np.sum(roots(p + q).real > 0, axis=-1)
     omega, direction, phase = crossings(p, q)
     times = np.maximum(np.ceil((omega * h[:, None] - phase) / (2 * np.pi)), 0.0)
@@ -168,7 +168,7 @@ def _count_by_crossings(p: Array, q: Array, h: Array) -> NDArray[np.int64]:
 
 
 def too_long(turns: float) -> NotAvailable:
-    """Error to raise for delays of up to so many turns of the rig's oscillations."""
+    """Error for delays of up to `turns` periods of the rig's oscillations."""
     return NotAvailable(
         f"the delays are so long beside the oscillations of this rig, up to {turns:.2g} turns, that its growing roots "
         "cannot be counted; shorten them"

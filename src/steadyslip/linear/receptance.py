@@ -1,4 +1,4 @@
-"""Answers of a rig's observables to small waves of its inputs about steady sliding."""
+"""Frequency response of a rig's observables to small oscillations of its inputs about steady sliding."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def receptance(
 ) -> NDArray[np.complex128]:
     """Complex amplitudes of outputs per unit of inputs, (..., frequencies, outputs, inputs), at omega (rad/s).
 
-    Forces that act late by a delay τ are turned by exp(-iωτ). NaN without steady sliding, and where the balances of
-    forces do not determine the motion.
+    Forces with a delay τ have a factor exp(-iωτ). NaN without steady sliding, and where the balances of forces do not
+    determine the motion.
 
     Parameters
     ----------

@@ -2,8 +2,8 @@
 
 For a law with one memory variable, τ̂ = [f − ĥ(s)] v̂ + [f1 + ĥ1(s)] σ̂ with one rate of decay r (eqs
 5-9, 13-16). Instead of the paper's λ and λ1 (infinite for Prakash–Clifton) this uses
-S = dτss/dv = −λf and μ = dτss/dσ = λ1 f1, which never are. S and μ come from the steady state that the law
-declares, f, f1 and r from its strength and rate: two separate statements of the law, so the agreement of
+S = dτss/dv = −λf and μ = dτss/dσ = λ1 f1, which are finite. S and μ come from the steady state that the law
+declares, f, f1 and r from its strength and rate: two independent statements of the law, so the agreement of
 this route with the Model's Jacobian checks the law itself.
 """
 
@@ -59,7 +59,7 @@ class Response(Displayed):
     k: Num
 
     def as_dict(self) -> dict[str, Any]:
-        """The ingredients by name, as the functions of `steadyslip.linear.cubic` take them."""
+        """Values by name, as arguments of the functions of `steadyslip.linear.cubic`."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     def characteristic_polynomial(self) -> tuple[Num, Num, Num, Num]:
@@ -85,13 +85,13 @@ class Response(Displayed):
 
 
 def has_closed_form(model: Model) -> bool:
-    """Whether the model is one that the cubic describes: one memory variable, no integral control."""
+    """True if the cubic describes the model: one memory variable, no integral control."""
     return model.has_closed_form
 
 
 @cached
 def response(model: Model) -> Response:
-    """The response of a model with one memory variable.
+    """Small-signal response of a model with one memory variable, as SymPy expressions.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def response(model: Model) -> Response:
     def at_steady(expression: sp.Expr) -> sp.Expr:
         return expression.xreplace(model.steady).doit()
 
-    # the law states strength(v, σ, memory, τ) − τ = 0; τ itself occurs in strength where the state depends on it only
+    # the balance is strength(v, σ, memory, τ) − τ = 0; strength contains τ only if the state depends on it
     own = -at_steady(derivative(balance, tau))
     f = at_steady(derivative(balance, v)) / own
     f1 = at_steady(derivative(balance, sigma)) / own
@@ -143,10 +143,10 @@ def _mechanics(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
 
 @cached
 def contact_coefficients(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
-    """B0, B1, B2, B3 of eq. 12 that a contact law comes down to, at steady sliding.
+    """Coefficients B0, B1, B2, B3 of eq. 12 of a contact law linearised at steady sliding.
 
-    A contact that depends on friction does so through the balance of forces τ = T − ηv − m v̇, which is
-    where its B0 = −γm and part of its B1 come from (theory 3, table of mechanisms).
+    If the normal stress depends on friction, τ is expressed by the balance of forces τ = T − ηv − m v̇, which
+    gives B0 = −γm and a part of B1 (theory 3, table of mechanisms).
     """
     contact = model.contact
     law = model.definitions[contact.normal]
@@ -211,7 +211,7 @@ def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
 
 
 def response_numbers(point: OperatingPoint) -> Response:
-    """The response as bare numbers or arrays; NaN where steady sliding does not exist."""
+    """Response of an operating point as numbers or arrays, not wrapped; NaN where steady sliding does not exist."""
     names, function = _response_function(point.model)
     missing = 0 * point.sigma
     return Response(**{name: x + missing for name, x in zip(names, point.evaluate(function), strict=True)})

@@ -1,7 +1,7 @@
 """Rightmost roots of quasi-polynomials Σ p_j(s) exp(−s h_j), shapes as in `quasipolynomial`.
 
-Delays taken as ratios of polynomials (Padé) give starting values, Newton's method the roots themselves, and one count
-of all roots right of a line tells that none is missing. Where one is, real parts are bisected on that count instead.
+Padé approximants of the delays give starting values, Newton's method the roots themselves, and a count of all roots
+right of a line shows that none is missing. If one is missing, real parts are found by bisection with such counts.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from steadyslip.linear.quasipolynomial import (
 )
 from steadyslip.linear.roots import Array, ComplexArray, companion_eigenvalues, quietly, roots
 
-_ORDER = 6  # of the ratios that give starting values: exp(−iωh) to 1e-3 up to ωh = 7.5
-_MOST_POWERS = 60  # powers of s of their polynomial beyond which bisecting is quicker; by trial
+_ORDER = 6  # order of the Padé approximants for starting values: exp(−iωh) to 1e-3 up to ωh = 7.5
+_MOST_POWERS = 60  # degree of the polynomial with Padé approximants above which bisection is faster; by trial
 _CHUNK = 500  # rigs at a time: some 20 MB of distances between their roots
-_NEWTON = 12  # steps of Newton's method from these, of which four or five are enough near a root
-_REAL = 1e-12  # imaginary part, relative to the root, that is rounding
-_MET = 1e-9  # relative size of the last step at a root, and share of its terms that is left there
-_APART = 1e-6  # relative distance from which two roots found are two
+_NEWTON = 12  # steps of Newton's method from starting values; four or five are enough near a root
+_REAL = 1e-12  # relative imaginary part of a root below which it is rounding error
+_MET = 1e-9  # tolerance of a root: relative size of the last step, and value relative to its terms
+_APART = 1e-6  # relative distance above which two roots found are distinct
 _FARTHEST = 700.0  # logarithm of the largest number, beyond which delayed terms leave floating point
 _HALVINGS = 60  # largest number of bisections of a real part: more than the 53 bits of a double
 _LOST = 1e10  # periods within one delay beyond which rounding leaves fewer than six digits of the phase
-_CLOSE = (1e-4, 1e-3, 1e-2, 0.1)  # distances from `_line_of_many`, relative to it, up to which roots are sought
-_QUICK = 1e5  # largest total phase (rad) of all delay terms up to the highest frequency: followed in less than a second
-_TOLD = 1e-3  # relative error up to which that line is told as the rate of the slowest decay
-_SAME_ROOT = 1e-9  # relative distance within which Newton's method has found one root again
-_ON_THE_LINE = 1e-3  # relative distance from a line of the real part of a root that is one of those on it
-_BISECTED = 1e-7  # the same where the line is the axis, in units of `nondimensional`: rounding of a double root
+_CLOSE = (1e-4, 1e-3, 1e-2, 0.1)  # relative distances from `_line_of_many` up to which roots are sought
+_QUICK = 1e5  # largest total phase (rad) of all delay terms up to the highest frequency that takes less than a second
+_RATE_TOLERANCE = 1e-3  # relative error up to which `_line_of_many` is returned as the rate of slowest decay
+_SAME_ROOT = 1e-9  # relative distance below which two results of Newton's method are one root
+_ON_THE_LINE = 1e-3  # relative distance of a root's real part from a line, up to which the root is on the line
+_BISECTED = 1e-7  # distance as `_ON_THE_LINE` if the line is the axis, in units of `nondimensional`: a double root
 _BESIDE_CROSSING = np.array([0.0, -0.375, -0.25, -0.125, 0.125, 0.25, 0.375, 0.5])  # turns, for Newton's method
 
 
@@ -51,9 +51,9 @@ _BESIDE_CROSSING = np.array([0.0, -0.375, -0.25, -0.125, 0.125, 0.25, 0.375, 0.5
 def rightmost(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
     """Rightmost roots, (..., count), by falling real part.
 
-    NaN where infinitely many lie right of the axis, or where those right of a line cannot be counted; beyond those
-    that lie right of `_line_of_many`, or so close to it that they are not told from the infinitely many there. The list
-    ends before a line on which Newton's method finds none.
+    NaN where infinitely many roots lie right of the axis, or roots cannot be counted. NaN also for roots left of
+    `_line_of_many`, or too close to it to be distinguished from the infinitely many there, and from the first root on
+    that Newton's method does not find.
     """
     flat = c.reshape(-1, *c.shape[-2:])
     delays = np.broadcast_to(h, (*c.shape[:-2], h.shape[-1])).reshape(-1, h.shape[-1])
@@ -71,9 +71,9 @@ def rightmost(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
 
 
 def _by_ratios(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
-    """The first `count` roots, (rows, count), where one count of roots shows that none is missing; NaN elsewhere.
+    """First `count` roots, (rows, count), if a count of roots shows that none is missing; else NaN.
 
-    Of rigs whose highest power no delay acts on; coefficients (rows, m, n+1).
+    For rigs whose highest power is not delayed; coefficients (rows, m, n+1).
     """
     found = np.full((len(c), count), np.nan + 0j, dtype=complex)
     longest = np.max(h, axis=-1)
@@ -83,23 +83,23 @@ def _by_ratios(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
     c, h = c[rows], h[rows]
     s = _distinct(*_refined(c, h, _starting_values(c, h, sets)))
     total = np.cumsum(np.where(np.isnan(s), 0, np.where(s.imag > 0, 2, 1)), axis=-1)
-    last = np.argmax(total >= count, axis=-1)[:, None]  # of the roots with s.imag >= 0 that are asked for
+    last = np.argmax(total >= count, axis=-1)[:, None]  # index of the last required root with s.imag >= 0
     asked, beyond = (np.take_along_axis(s, one, axis=-1)[:, 0] for one in (last, np.minimum(last + 1, s.shape[-1] - 1)))
     gap = np.where(beyond.real < asked.real, asked.real - beyond.real, np.abs(asked))
     line = asked.real - 0.5 * np.minimum(gap, np.abs(asked))
     usable = (gap > _APART * np.abs(asked)) & (-line * longest[rows] < _FARTHEST)
-    told = np.flatnonzero(usable & (total[:, -1] >= count))
-    right = count_right_if_feasible(c[told], h[told], sets, line[told])
-    told = told[right == np.take_along_axis(total, last, axis=-1)[told, 0]]
-    own = s[told]
+    found_all = np.flatnonzero(usable & (total[:, -1] >= count))
+    right = count_right_if_feasible(c[found_all], h[found_all], sets, line[found_all])
+    found_all = found_all[right == np.take_along_axis(total, last, axis=-1)[found_all, 0]]
+    own = s[found_all]
     both = np.stack([own, np.where(own.imag > 0, own.conj(), np.nan)], axis=-1).reshape(len(own), 2 * own.shape[-1])
     order = np.argsort(np.isnan(both), axis=-1, kind="stable")[:, :count]
-    found[rows[told]] = np.take_along_axis(both, order, axis=-1)
+    found[rows[found_all]] = np.take_along_axis(both, order, axis=-1)
     return found
 
 
 def _starting_values(c: Array, h: Array, sets: Sets) -> ComplexArray:
-    """Roots (rows, k) of the polynomial that comes of a ratio for every exp(−sτ) of a delay τ."""
+    """Roots (rows, k) of the polynomial with a Padé approximant in place of exp(−sτ) for every delay τ."""
     k = np.arange(_ORDER + 1)
     below = np.array([math.comb(_ORDER, i) / math.perm(2 * _ORDER, i) for i in k])  # of exp(x): above, in powers of x
     late = np.maximum(h @ np.linalg.pinv(sets.astype(float)).T, 0.0)  # (rows, delays)
@@ -114,7 +114,7 @@ def _starting_values(c: Array, h: Array, sets: Sets) -> ComplexArray:
 
 
 def _refined(c: Array, h: Array, s: ComplexArray) -> tuple[ComplexArray, NDArray[np.bool_]]:
-    """Roots (rows, k) by Newton's method, with imaginary part zero or positive, and where they are met."""
+    """Roots (rows, k) by Newton's method, with imaginary part zero or positive, and True where it converged."""
     for _ in range(_NEWTON):
         step = value(c, h, s) / slope(c, h, s)
         s = np.where(np.isfinite(step), s - step, s)
@@ -124,7 +124,7 @@ def _refined(c: Array, h: Array, s: ComplexArray) -> tuple[ComplexArray, NDArray
 
 
 def _distinct(s: ComplexArray, met: NDArray[np.bool_]) -> ComplexArray:
-    """Those that are met, each once, by falling real part; NaN beyond."""
+    """Converged roots without duplicates, by falling real part; NaN padded."""
     s = np.where(met, s, np.nan + 0j)
     s = np.take_along_axis(s, np.argsort(-s.real, axis=-1, kind="stable"), axis=-1)
     same = np.abs(s[:, :, None] - s[:, None, :]) <= _APART * np.abs(s)[:, :, None]
@@ -176,9 +176,9 @@ def _rightmost_of_one(c: Array, h: Array, sets: Sets, count: int) -> ComplexArra
 
 
 def _left_end(c: Array, h: Array, sets: Sets) -> tuple[float, float, int]:
-    """`_line_of_many` of one rig, the real part beside it right of which roots are looked for, and how many there are.
+    """`_line_of_many` of one rig, a real part right of it up to which roots are sought, and the number of these roots.
 
-    −inf twice and `INFINITE` if no highest derivative is delayed.
+    (−inf, −inf, `INFINITE`) if no highest derivative is delayed.
     """
     line = _line_of_many(c, h, sets)
     if not np.isfinite(line):
@@ -197,8 +197,8 @@ def _left_end(c: Array, h: Array, sets: Sets) -> tuple[float, float, int]:
 def _line_of_many(c: Array, h: Array, sets: Sets) -> float:
     """Real part right of which a rig has finitely many roots, for coefficients c (m, n+1) and delays h (m,).
 
-    Left of it the highest power of s can vanish: infinitely many roots come as close to it as one likes, for the given
-    delays or others as near as one likes to them. −inf if no highest derivative is delayed.
+    Left of it the highest power of s can vanish: infinitely many roots come arbitrarily close to it, for the given
+    delays or delays arbitrarily near them. −inf if no highest derivative is delayed.
     """
     top = highest(c[None])[0]
     if not np.any(top[:, 1:] * h[1:]):
@@ -221,13 +221,13 @@ def _line_of_many(c: Array, h: Array, sets: Sets) -> float:
 
 @quietly
 def rate_of_many(c: Array, h: Array, sets: Sets) -> float:
-    """Real part (1/s) to which the rightmost roots of one rig, infinitely many, tend.
+    """Real part (1/s) to which the infinitely many rightmost roots of one rig converge.
 
-    NaN where others lie further right, or where that is not known to a thousandth.
+    NaN if other roots lie further right, or if that is not known to a relative error of `_RATE_TOLERANCE`.
     """
     (scaled,), (own,), (rate,) = nondimensional(c[None], h[None])
     line, left, many = _left_end(scaled, own, sets)
-    return float(rate * line) if many == 0 and left - line <= _TOLD * abs(line) else math.nan
+    return float(rate * line) if many == 0 and left - line <= _RATE_TOLERANCE * abs(line) else math.nan
 
 
 @quietly
@@ -240,7 +240,7 @@ def nearest_to_axis(c: Array, h: Array, sets: Sets) -> complex:
 def _root_on(c: Array, h: Array, sets: Sets, real: float, known: Sequence[complex] = ()) -> complex:
     """Root nearest to the line Re s = `real`, with imaginary part zero or positive, by Newton's method.
 
-    Not one of the `known` roots, if another is found: many may lie on one line.
+    A root that is not `known` is preferred, as many may lie on one line.
     """
     moved = shifted(c, h, np.asarray(real))
     starts = real + 1j * np.array([0.0, *_near_axis(moved, h, sets)])
@@ -261,7 +261,7 @@ def _root_on(c: Array, h: Array, sets: Sets, real: float, known: Sequence[comple
 
 def _near_axis(c: Array, h: Array, sets: Sets) -> Iterator[float]:
     """Frequencies near which a root may lie on the imaginary axis, starting values for Newton's method."""
-    common = roots(c[:1])[0]  # zeros of all terms, of what nothing late acts on: there each term may lead
+    common = roots(c[:1])[0]  # roots of motions without delay are common zeros of all terms
     yield from np.abs(common.imag[np.isfinite(common)]).tolist()
     if len(c) == 2:  # sizes of both terms agree there; the next root is within half a turn
         found = np.array([one for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one)])

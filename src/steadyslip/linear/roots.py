@@ -18,18 +18,18 @@ ComplexArray = NDArray[np.complex128]
 
 P = ParamSpec("P")
 R = TypeVar("R")
-_UNMET = 1e-9  # share of its terms that a polynomial keeps at a root, beyond which it is found again
-_APART = 1e4  # ratio of sizes from which on roots are found in groups: each is then alone in its own units
-_GONE = 1e-12  # share of the largest coefficient, in a group's own units, that hardly moves a root of the group
-_CLOSE = 1e-3  # relative distance of two roots below which they are found again as a pair
-_ROUNDING = 16 * np.finfo(float).eps  # share of (half sum)² below which a pair's discriminant is zero to rounding
+_UNMET = 1e-9  # residual at a root relative to its terms, above which the root is computed by groups of size
+_APART = 1e4  # ratio of sizes above which roots are in different groups, each solved in its own time unit
+_GONE = 1e-12  # relative size of a coefficient, in a group's time unit, below which it hardly affects the group
+_CLOSE = 1e-3  # relative distance of two roots below which they are computed as a quadratic factor
+_ROUNDING = 16 * np.finfo(float).eps  # discriminant over (half sum)² below which it is rounding error of zero
 
 
 def quietly(function: Callable[P, R]) -> Callable[P, R]:
     """Decorate a function so that overflow gives inf or NaN without a NumPy warning.
 
-    A fresh `numpy.errstate` for every call: one instance that decorates functions which call each other, or run in
-    several threads, leaves NumPy's error state changed (before NumPy 2).
+    Every call makes its own `numpy.errstate`: before NumPy 2, a single instance leaves the error state changed if
+    decorated functions call each other or run in several threads.
     """
 
     @wraps(function)
@@ -91,7 +91,7 @@ def _roots_of_degree(c: Array) -> ComplexArray:
 
 
 def companion_eigenvalues(c: Array) -> ComplexArray:
-    """Eigenvalues of the companion matrices; small ones beside very large ones are rounding."""
+    """Eigenvalues of the companion matrices (rows, n); small ones beside very large ones are rounding error."""
     d = c.shape[-1] - 1
     companion = np.zeros((len(c), d, d))
     companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
@@ -104,7 +104,7 @@ def companion_eigenvalues(c: Array) -> ComplexArray:
 
 
 def _polished(c: Array, found: ComplexArray) -> ComplexArray:
-    """Approximate roots, (rows, m), by Newton's method; those close together as pairs."""
+    """Roots (rows, m) improved by Newton's method; close pairs by a common quadratic factor."""
     d = c.shape[-1] - 1
     slope = c[:, None, 1:] * np.arange(1, d + 1)
     value = evaluate(c[:, None, :], found)
@@ -127,7 +127,7 @@ def _polished(c: Array, found: ComplexArray) -> ComplexArray:
 def _are_missed(c: Array, s: ComplexArray) -> NDArray[np.bool_]:
     """True for polynomials (rows,) of full degree some of whose computed roots (rows, n) are wrong or missing.
 
-    Each must make the polynomial vanish beside its terms, and all together have the product c0/cn.
+    At each root the polynomial must vanish relative to its terms, and the product of all roots must be c0/cn in size.
     """
     size = np.abs(s)
     left = np.abs(evaluate(c[:, None, :], s)) <= _UNMET * evaluate(np.abs(c)[:, None, :], size)
@@ -137,10 +137,10 @@ def _are_missed(c: Array, s: ComplexArray) -> NDArray[np.bool_]:
 
 
 def _roots_by_size(c: Array) -> ComplexArray:
-    """Roots of polynomials of full degree that hold some of very different size, (rows, n).
+    """Roots (rows, n) of polynomials of full degree that have roots of very different size.
 
-    For roots of about one size, time is counted in units in which they are about one: what the others add to
-    coefficients is then nothing. Polynomials whose roots are grouped alike are solved together.
+    Each group of roots of similar size is computed with time in units in which they are about one, as the effect of the
+    other roots on the coefficients is then negligible. Polynomials with equal groups are solved together.
     """
     n = c.shape[-1] - 1
     mantissa, exponent = np.frexp(c)
@@ -157,14 +157,14 @@ def _roots_by_size(c: Array) -> ComplexArray:
         own = np.array([one for _, _, one in members])
         inner = companion_eigenvalues(own[:, bottom : top + 1])
         inner = np.take_along_axis(inner, np.argsort(-np.abs(inner), axis=-1, kind="stable"), axis=-1)
-        skip = first - (n - top)  # larger roots that are among these
+        skip = first - (n - top)  # number of roots in `inner` that belong to groups of larger roots
         rows, units = [row for row, _, _ in members], np.array([unit for _, unit, _ in members])
         found[rows, first:last] = _scaled(_polished(own, inner[:, skip : skip + last - first]), units[:, None])
     return found
 
 
 def _groups_of_size(mantissa: Array, exponent: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
-    """First and last of roots of about one size, the largest first, and the power of two that their size is near.
+    """Yield groups of roots of similar size, largest first: first index, end index, and nearest power of two (log2).
 
     The upper hull of the logarithms of a polynomial's coefficients gives the sizes (Newton's polygon).
     """
@@ -195,7 +195,7 @@ def _close_pair(c: Array, one: ComplexArray, other: ComplexArray) -> ComplexArra
     u, w = -(start[0] + start[1]).real.astype(np.longdouble), (start[0] * start[1]).real.astype(np.longdouble)
     nothing = np.zeros_like(u)
     for _ in range(5):
-        b, slope = [nothing, nothing], [nothing, nothing]  # of the polynomial over the factor, and of that once more
+        b, slope = [nothing, nothing], [nothing, nothing]  # coefficients after one and two divisions by the factor
         for column in scaled.T[::-1]:
             b.append(column - u * b[-1] - w * b[-2])
             slope.append(b[-1] - u * slope[-1] - w * slope[-2])
@@ -210,7 +210,7 @@ def _close_pair(c: Array, one: ComplexArray, other: ComplexArray) -> ComplexArra
 
 
 def _quadratic(c: Array) -> ComplexArray:
-    """Roots of c0 + c1 s + c2 s² without cancellation; a pair that is double to within rounding is real."""
+    """Roots (rows, 2) of c0 + c1 s + c2 s² without cancellation; a pair that is double to within rounding is real."""
     c0, c1, c2 = (part.astype(np.longdouble) for part in c.T)
     discriminant = c1 * c1 - 4 * c0 * c2
     discriminant = np.where(np.abs(discriminant) <= _ROUNDING * c1 * c1, 0, discriminant)

@@ -1,7 +1,7 @@
 """Sample values of a parameter for the scan for edges.
 
-Samples follow from the parameter's domain, value and natural size. A requested range only adds samples beyond the usual
-ones and moves none, so that the edges found do not depend on the range.
+Samples follow from the parameter's domain, value and natural size. A requested range only adds samples beyond the
+default range, so that the edges found do not depend on the request.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _PER_DECADE = 40
 _FURTHER = 10  # samples per decade beyond `DECADES`
 _LINEAR = 721  # samples between the two ends of a domain: a quarter of a degree for angles from −90 to 90 degrees
 _TOWARDS = 4  # samples per decade of the distance to an end of the domain or to an edge
-_NEAREST = 1e-9  # distance from an edge, relative to its size, below which rounding may decide the status
+_NEAREST = 1e-9  # relative distance from an edge below which the status may be wrong by rounding
 _LARGEST = 300  # largest exponent of ten of a sample: doubles end at 308
 
 
@@ -52,7 +52,7 @@ def unbounded(domain: Domain, zero: bool, size: float, least: float, most: float
     decades = np.concatenate([-lower[::-1], middle, upper])
     power = decades + np.log10(size)
     decades, power = decades[np.abs(power) < _LARGEST], power[np.abs(power) < _LARGEST]
-    with np.errstate(over="ignore"):  # of a size that is nearly nothing
+    with np.errstate(over="ignore"):  # for extremely small sizes
         samples = np.where(decades < _LARGEST, size * 10.0**decades, 10.0**power)
     nothing = np.zeros(int(zero or domain.low < 0))
     samples = np.concatenate([-samples[::-1] if domain.low < 0 else [], nothing, samples])

@@ -2,9 +2,9 @@
 
 The parameter is sampled over its range; where the status (stable, unstable, no steady sliding) of two samples
 differs, the change is bracketed and narrowed to rounding. Dips of the damping between samples are followed,
-so that a narrow window is not stepped over. Samples whose status is a matter of rounding are left out: a rig on
+so that a narrow window is not stepped over. Samples whose status depends on rounding are left out: a rig on
 its edge has that edge in every parameter that moves it, and none in the others. For the stiffness itself the
-edges are exact (theory 3), and so are those of whatever enters linearly in a machine (theory 11).
+edges are exact (theory 3), and so are those of every parameter that enters linearly in a machine (theory 11).
 """
 
 from __future__ import annotations
@@ -44,49 +44,49 @@ from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.sliding import explain_absence
 
-_ROUNDING = 64  # units in the last place within which two edges are one, in the first attempt
-_WIDER = 6  # attempts, each 8 times wider: up to about 1e-10 of the value, still the same edge for a verdict
+_ROUNDING = 64  # first distance, in units in the last place, within which two edges are merged
+_WIDER = 6  # number of distances tried, each 8 times wider: up to 1e-10 of the value, negligible for a verdict
 _BESIDE = 4  # a kind is the status plus multiples of this; kind % _BESIDE is the status
 # Limits of the scan, chosen by trial: computing time against edges missed where several lie close together.
-_FLAT = 1e-6  # relative depth of a dip of a measure below which it is rounding on a level stretch
+_FLAT = 1e-6  # relative depth of a minimum of a measure below which it is rounding error of a constant
 _DIPS = 16  # deepest dips that are examined: similar contacts have eigenvalues that jitter at every sample
 _ROUNDS = 8  # rounds of narrowing; each finds one more edge between two samples that have several between them
-_CHANGES = 64  # changes of kind above which only changes of the status are narrowed: rounding makes the others
+_CHANGES = 64  # with more changes of kind only changes of status are narrowed, as the others are due to rounding
 _MORE = 8  # changes that a round may find beyond those of the round before
 SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 _FEW = 8  # largest number of growing roots (with delay) at which a dip between two samples is examined
-_NEAR = 100.0  # factor from the own value within which all samples must be counted, or an edge may be missed
+_NEAR = 100.0  # factor from the own value within which roots of all samples must be countable
 _SCARCE = 6  # factor by which samples are fewer with several delays: their roots are counted rig by rig
 
 
 @dataclass(frozen=True)
 class Boundary(Displayed):
-    """One value of a parameter at which stability changes.
+    """Edge: a value of a parameter at which stability changes.
 
     Attributes
     ----------
     parameter : str
         Dotted name.
     value : float
-        SI units; the middle of `bracket`.
+        Value at the edge, SI units; the middle of `bracket`.
     bracket : tuple of float
-        Neighbouring values with different status.
+        Neighbouring values of the parameter with different status.
     kind : str
         ``oscillatory`` (a pair of eigenvalues crosses at ±iβ), ``divergence`` (one crosses at zero),
         ``ill-posed`` (the effective mass or direct effect changes sign), ``lock-up``, ``lift-off`` or
-        ``no solution`` (steady sliding ceases to exist); of a rig that nothing damps ``coupling`` (two oscillations
-        meet in frequency, and one grows beyond) instead of ``oscillatory``.
+        ``no solution`` (steady sliding ceases to exist); for undamped rigs ``coupling`` (two oscillations meet in
+        frequency, and one grows beyond) instead of ``oscillatory``.
     angular_frequency : float
         β in rad/s, 0 unless oscillatory or coupling.
     stable : str
-        On which side steady sliding is stable: ``above``, ``below`` or ``neither``.
+        Side on which steady sliding is stable: ``above``, ``below`` or ``neither``.
     unit : str
     area : float or None
         Contact area of the rig, m²; where there is one, values are printed as totals.
     contact : str
         Contact of a machine that locks up or lifts off beyond the edge; empty otherwise.
     quiet : str
-        Of a rig that nothing damps the side on which no root grows, ``above`` or ``below``; empty otherwise.
+        For undamped rigs the side on which no root grows, ``above`` or ``below``; empty otherwise.
     """
 
     parameter: str
@@ -124,8 +124,8 @@ class Search:
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
         self.own = operating_point(rig, None, self.present, branch)
         self.share = _SCARCE if len(self.own.model.delays) > 1 else 1
-        self.hides = False  # whether an edge lies, or may lie near, where roots under delays cannot be counted
-        self.decided = -np.inf, np.inf  # values beyond which windows under delays are too many to be searched
+        self.hides = False  # True if edges may be missing because roots under delays cannot be counted
+        self.decided = -np.inf, np.inf  # range outside which windows under delays are too many to be searched
 
     def values(self, x: float | Array) -> OperatingPoint:
         return operating_point(self.rig, {self.name: x}, self.present, self.branch, scan=True)
@@ -146,7 +146,7 @@ class Search:
 
     @property
     def on_the_grid(self) -> OperatingPoint:
-        """The rig at all values of the usual grid at which it can be built."""
+        """Operating point of the rig at all values of the default grid at which it can be built."""
         grid, point = self._usual
         valid = np.broadcast_to(point.valid, grid.shape)
         return point if np.all(valid) else self.values(grid[valid])
@@ -246,7 +246,7 @@ class Search:
         return grid, self.values(grid)
 
     def _judged(self, grid: Array, point: OperatingPoint) -> tuple[Array, NDArray[np.int64]]:
-        """Samples with those at hidden windows added, and their kinds; without samples whose status is rounding."""
+        """Samples with their kinds; hidden windows are added, samples whose status depends on rounding are dropped."""
         valid = np.broadcast_to(point.valid, grid.shape)
         outside = grid[~valid], np.full(np.count_nonzero(~valid), UNKNOWN)
         here, point = (grid, point) if np.all(valid) else (grid[valid], self.values(grid[valid]))
@@ -257,7 +257,7 @@ class Search:
         return _merged(found, outside, self._certain(self._hidden_windows(here, own, point)))
 
     def _certain(self, x: Array) -> tuple[Array, NDArray[np.int64]]:
-        """Samples and their kinds; without samples whose status is rounding or whose roots cannot be counted."""
+        """Samples with their kinds, without those whose status depends on rounding or whose roots cannot be counted."""
         x = np.unique(x)
         if not x.size:
             return x, np.empty(0, dtype=np.int64)
@@ -268,7 +268,7 @@ class Search:
             return _merged(outside, self._certain(x[valid]))
         try:
             certain = can_be_counted(point) & ~on_edge(point)
-        except NotAvailable:  # beside an edge, roots under a delay may turn too often to be told
+        except NotAvailable:  # close to an edge, roots under a delay may be too many to count
             if len(x) == 1:
                 return np.empty(0), np.empty(0, dtype=np.int64)
             return _merged(self._certain(x[: len(x) // 2]), self._certain(x[len(x) // 2 :]))
@@ -288,7 +288,7 @@ class Search:
             dips &= np.maximum(size[:-2], size[2:]) > size[1:-1] * (1 + _FLAT)
             at = np.flatnonzero(dips & same & np.isfinite(measure[1:-1])) + 1
             at = at[np.argsort(size[at], kind="stable")]
-            usual = (grid[at] >= low) & (grid[at] <= high)  # what is asked for beyond changes nothing within
+            usual = (grid[at] >= low) & (grid[at] <= high)  # a wider request must not change results inside
             at = np.sort(np.concatenate([at[usual][:_DIPS], at[~usual][:_DIPS]]))
             if at.size:
                 extra += self._descended(which, np.sign(measure[at]), grid[at - 1], grid[at + 1])
@@ -342,10 +342,10 @@ class Search:
     def _past_rounding(self, low: float, high: float) -> tuple[float, float]:
         """Bracket of an edge, widened where steady sliding ends within rounding of it.
 
-        The static stiffness vanishes there too, so that rounding alone decides which of the two comes first.
+        The static stiffness vanishes there too, so that the order of the two is due to rounding only.
         """
         unit = max(np.spacing(abs(low)), np.spacing(abs(high)))
-        reach = _ROUNDING * unit * 8.0 ** np.arange(_WIDER)  # friction hardly changes with the velocity, say
+        reach = _ROUNDING * unit * 8.0 ** np.arange(_WIDER)  # wide if, for example, friction hardly depends on velocity
         wide = np.stack([low - reach, high + reach])
         wide = wide[:, : np.argmin(np.append(np.all(self.role.domain.contains(wide), axis=0), False))]
         status = self.status(wide.ravel()).reshape(wide.shape) if wide.size else np.zeros_like(wide, dtype=int)
@@ -371,7 +371,7 @@ class Search:
         point = self.own
         late = bool(point.model.delays)
         if self.name == STIFFNESS:
-            with suppress(NotAvailable):  # windows without end
+            with suppress(NotAvailable):  # infinitely many windows
                 return set_of_one(point)
             return None
         if (point.model.is_slider and not late) or not point.exists or self.role.domain.low < 0:
@@ -402,13 +402,13 @@ def natural_size(
     ----------
     unit_name : str
     total : bool
-        True for totals: of forces, not stresses.
+        True if the parameter is a total (force), not per unit area (stress).
     stresses : iterable of float
         σss of the contacts (Pa).
     drive, rate : float
         v0 (m/s), and the fastest decay rate of a memory (1/s), 0 without memory.
     value : float
-        The rig's own, the result where that is not finite.
+        Value in the rig; its size is returned if the result is not finite.
     """
     sigma = np.exp(np.mean(np.log([float(one) for one in stresses])))
     _, d = unit(unit_name)

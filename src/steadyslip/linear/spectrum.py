@@ -24,8 +24,8 @@ _ONE_CROSSING = 2  # largest number of roots that one crossing adds right of the
 def spectrum(point: OperatingPoint) -> ComplexArray:
     """Eigenvalues (1/s), (..., n), by falling real part, NaN padded; with delays the n rightmost.
 
-    n is the number of eigenvalues of the rig with all delays zero. Where rounding hides some (`digits_lost`), those of
-    a single rig are computed with many digits; of an array they are NaN.
+    n is the number of eigenvalues of the rig with all delays zero. Where some are lost to rounding (`digits_lost`),
+    those of a single rig are computed with many digits; those of an array are NaN.
     """
     if not point.model.delays:
         return roots(characteristic(point)) if is_written_out(point.model) else _of_state_matrix(point)
@@ -36,8 +36,8 @@ def spectrum(point: OperatingPoint) -> ComplexArray:
 def growth(point: OperatingPoint) -> Array:
     """Largest real part (1/s) of the eigenvalues, (...); NaN where none is known.
 
-    With a delayed highest derivative there may be no rightmost eigenvalue: infinitely many come as near as one likes to
-    a line, whose real part is given then.
+    With a delayed highest derivative there may be no rightmost eigenvalue: infinitely many come arbitrarily near to a
+    line, whose real part is returned then.
     """
     found = (_rightmost(point, 1) if point.model.delays else spectrum(point)).real
     rate = np.max(np.where(np.isnan(found), -np.inf, found), axis=-1)
@@ -70,7 +70,7 @@ def _of_state_matrix(point: OperatingPoint) -> ComplexArray:
 def is_stable(point: OperatingPoint, unless_long: bool = False) -> NDArray[np.bool_]:
     """True where all roots lie left of the imaginary axis and the equations are well posed.
 
-    With `unless_long` False where roots cannot be counted (`can_be_counted`), which is refused else.
+    Where roots cannot be counted (`can_be_counted`): False with `unless_long`, else NotAvailable is raised.
     """
     if point.model.delays:
         right = counts(point) if unless_long else unstable_roots(point)
@@ -88,7 +88,7 @@ def can_be_counted(point: OperatingPoint) -> NDArray[np.bool_]:
 
 @cached
 def counts(point: OperatingPoint) -> NDArray[np.int64]:
-    """As `unstable_roots`, with `UNKNOWN` where roots cannot be counted."""
+    """Number of roots right of the axis, as `unstable_roots`, but `UNKNOWN` where roots cannot be counted."""
     found = with_delays.count_right_if_feasible(*quasipolynomial(point), delays_in_terms(point.model))
     return np.where(late_on_springs(point) & point.exists, with_delays.INFINITE, found)
 
@@ -104,8 +104,8 @@ def unstable_roots(point: OperatingPoint) -> NDArray[np.int64]:
 def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
     """True where the equations are ill-posed: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3); see `spare_powers`.
 
-    With delays also where the delayed terms of the highest derivative outweigh the undelayed one (`neutral`): then ever
-    faster oscillations grow.
+    With delays also where the delayed terms of the highest derivative outweigh the undelayed one (`neutral`):
+    oscillations of arbitrarily high frequency grow then.
     """
     if not point.model.delays:
         return _ill_posed(point, characteristic(point))
@@ -114,9 +114,9 @@ def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def among_many(point: OperatingPoint, found: ComplexArray) -> NDArray[np.bool_]:
-    """True where some of the eigenvalues `found` (..., n) are NaN as they are not told from infinitely many, (...).
+    """True (...) where eigenvalues in `found` (..., n) are NaN because infinitely many lie close together.
 
-    A delayed highest derivative (a body without mass under a late controller) makes these; for ill-posed rigs False.
+    That happens with a delayed highest derivative (a body without mass under a late controller). False if ill-posed.
     """
     if not point.model.delays:
         return np.zeros(point.shape, dtype=bool)
@@ -128,9 +128,9 @@ def among_many(point: OperatingPoint, found: ComplexArray) -> NDArray[np.bool_]:
 
 
 def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
-    """Dotted names of the delays that make a single rig ill-posed; empty if it is well posed, or ill-posed anyway.
+    """Dotted names of the delays that make a single rig ill-posed; empty if well posed, or ill-posed without them too.
 
-    A delay does so where, on a body without mass, the delayed terms outweigh those that act at once.
+    A delay makes a rig ill-posed if, on a body without mass, delayed terms outweigh undelayed ones.
     """
     c, _ = quasipolynomial(point)
     if not point.model.delays or _ill_posed(point, c[0]) or counts(point) != with_delays.INFINITE:
@@ -175,9 +175,9 @@ def crossing_frequency(point: OperatingPoint) -> float:
 
 
 def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:
-    """True where an oscillation neither grows nor decays (see `_negligible`); with delays one of a phase up to `share`.
+    """True where an oscillation neither grows nor decays (see `_negligible`).
 
-    With delays the leading one alone is asked.
+    With delays only the leading oscillation is tested, by a phase of at most `share` (rad).
     """
     if not point.model.delays:
         s = spectrum(point)
@@ -190,7 +190,7 @@ def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:
 def distance_from_axis(point: OperatingPoint) -> Array:
     """Distance of the rightmost root from the imaginary axis, relative to its size, (...); NaN where none is known.
 
-    With one delay the phase (rad) by which a crossing is missed, which is never less; inf where other roots grow.
+    With one delay the phase (rad) to the nearest crossing, which is at least as large; inf where other roots grow.
     """
     if len(point.model.delays) == 1:
         return np.where(counts(point) <= _ONE_CROSSING, np.nanmin(np.abs(nearness(point)), axis=0), np.inf)
@@ -203,8 +203,8 @@ def distance_from_axis(point: OperatingPoint) -> Array:
 def _negligible(s: ComplexArray, share: float) -> Array:
     """Size (1/s) of a real part up to which an eigenvalue (..., n) counts as one on the imaginary axis.
 
-    It is `share` of the eigenvalue's own size, or of the geometric mean of all if that is less: a link so stiff that
-    its own oscillation is hardly damped within a period may still decay faster than all else.
+    It is `share` of the eigenvalue's own size, or of the geometric mean of all if that is less: the oscillation of a
+    very stiff link may have a small damping ratio and still decay faster than all others.
     """
     size = np.abs(s)
     some = np.isfinite(size) & (size > 0)
@@ -232,7 +232,7 @@ def outgrown(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray
 
 
 def _grows_late(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray[np.bool_]:
-    """As `outgrown`, with delays: those right of a line, at `share` of the mean size without delay, are counted."""
+    """Result of `outgrown` with delays, by a count of roots right of the line at `share` of their mean size."""
     sets = delays_in_terms(point.model)
     with np.errstate(all="ignore"):
         c, h, _ = with_delays.nondimensional(*quasipolynomial(point))

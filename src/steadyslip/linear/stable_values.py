@@ -1,6 +1,6 @@
 """Exact stable sets of parameters θ that enter the characteristic polynomial linearly, p(s) + θ q(s) (theory 11).
 
-Stiffnesses, dampings, masses and gains do, and much of friction as well. Whether a parameter does is read off the
+Stiffnesses, dampings, masses and gains enter linearly, and many friction parameters too. Linearity is tested on the
 polynomial itself, at three values that are decades apart.
 """
 
@@ -32,7 +32,7 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
     rig : Slider or Machine
     name : str
         Dotted name, or a unique last part, of a positive parameter that the rig has: a link's stiffness or damping, a
-        gain, a mass, a preload, ...; or a delay, whether it is there yet or not.
+        gain, a mass, a preload, ...; or a delay, which may be 0 in the rig.
     vary : mapping of str to array_like or xarray.DataArray, optional
         Other parameters to vary, by dotted name, in SI units; they broadcast.
 
@@ -49,9 +49,10 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
 
     Notes
     -----
-    With a delay, roots are counted, no rational function stands for it. All delays are found; of other parameters of a
-    rig with delay, which may have windows without end, those up to a factor of a million from its own value in which no
-    oscillation turns more than a hundred times during the delay; the last interval ends there. `boundary` says so.
+    With a delay, roots are counted; no rational function replaces it. Stable values of a delay itself are all found.
+    Other parameters of a rig with delay may have infinitely many intervals; these are searched up to a factor of a
+    million from the own value, and as long as no oscillation has more than a hundred periods during the delay. The last
+    interval ends there, and `boundary` issues a warning.
 
     Examples
     --------
@@ -78,7 +79,7 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
 
 @checked()
 def safety_factor(rig: Slider | Machine, vary: Vary | None = None, *, along: str | None = None) -> Any:
-    """Stiffness over critical stiffness k/k_cr, a controller's gain kp counted with both; or a parameter over its edge.
+    """Stiffness over critical stiffness k/k_cr, a controller's gain kp added to both; or a parameter over its edge.
 
     Parameters
     ----------
@@ -92,14 +93,14 @@ def safety_factor(rig: Slider | Machine, vary: Vary | None = None, *, along: str
     Returns
     -------
     float, ndarray or xarray.DataArray
-        The value over the nearest end of an interval of stable values. Sliding is stable above 1 where the edge is a
-        lower limit, as it is of most stiffnesses, and below 1 where it is an upper one; `stable_values` tells. NaN
-        where there is none. Without a spring it is the gain over the critical gain.
+        Value over the nearest end of an interval of stable values. Sliding is stable above 1 if the edge is a lower
+        limit, as for most stiffnesses, and below 1 if it is an upper limit; see `stable_values`. NaN without an edge.
+        Without a spring it is the gain over the critical gain.
 
     Raises
     ------
     ParameterError
-        If of a machine no parameter is named.
+        If no parameter is named for a machine.
     NotAvailable
         If the parameter does not enter linearly.
 
@@ -125,7 +126,7 @@ def name_along(rig: Slider | Machine, along: str | None) -> str:
     Raises
     ------
     ParameterError
-        If there is no such parameter, or none is given of a machine.
+        If there is no such parameter, or no parameter is named for a machine.
     """
     if along is None and rig.default_along is None:
         known = {name: one for name, one in rig.parameters().items() if one.value and one.role.kind != "delay"}

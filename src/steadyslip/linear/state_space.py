@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 
 def jacobian(rig: Slider | Machine) -> Array:
-    """Jacobian (1/s and mixed units) at steady sliding of the Model's own variables that are states.
+    """Jacobian (n, n) of the rates of the states at steady sliding, SI units of the Model's variables.
 
-    The algebraic unknowns are eliminated. Its eigenvalues are the route to stability that is independent of the closed
-    form and of the characteristic polynomial.
+    The algebraic unknowns are eliminated. Its eigenvalues give stability independently of the closed form and of the
+    characteristic polynomial.
     """
     return state_matrices(rig, ()).a
 
@@ -66,7 +66,7 @@ def state_matrices(
             "a delay has no state space of finitely many variables; eigenvalues gives the rightmost ones"
         )
     require_range(point)
-    steady_state(rig)  # raises, and says which contact locks or lifts
+    steady_state(rig)  # raises NoSteadySliding with the contact that locks up or lifts off
     if is_ill_posed(point):
         raise NotAvailable("ill-posed: the friction law does not determine the motion (its direct effect is zero)")
     blocks = blocks_of(point, outputs, known)
@@ -79,7 +79,7 @@ def state_matrices(
 
 
 def _pressure_of(rig: Slider | Machine, name: str) -> float:
-    """What a unit of an input is in the Model: a force on a contact with an area is a stress there."""
+    """Factor from a unit of an input to the Model's input: 1/area for forces on contacts with an area, else 1."""
     contact, _, kind = name.rpartition(".")
     if kind not in ("press", "pores"):
         return 1.0
@@ -87,7 +87,7 @@ def _pressure_of(rig: Slider | Machine, name: str) -> float:
 
 
 def _require_eigenvalues(point: OperatingPoint, a: Array) -> None:
-    """Refuse a state matrix that rounding leaves without some of the eigenvalues of the rig.
+    """Raise NotAvailable if the state matrix lacks eigenvalues of the rig because of rounding.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def _require_eigenvalues(point: OperatingPoint, a: Array) -> None:
 
 
 def _usual_outputs(model: Model) -> tuple[str, ...]:
-    """Of a slider those of the paper, of a machine places and velocities, and friction and normal forces."""
+    """Names of the default outputs: for a slider those of the paper, for a machine x, v and contact forces."""
     usual = {"x", "v", "shear_stress", "friction_force", "normal_stress", "normal_force"}
     return tuple(name for name in model.observables if name.rpartition(".")[2] in usual)
 
@@ -118,7 +118,7 @@ def _usual_outputs(model: Model) -> tuple[str, ...]:
 def state_space(
     rig: Slider | Machine, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None
 ) -> StateSpace:
-    """The linearised rig as `scipy.signal.StateSpace`.
+    """Linearised rig as `scipy.signal.StateSpace`.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def state_space(
 
 @checked()
 def to_control(rig: Slider | Machine, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None) -> Any:
-    """The same as `state_space` for the ``control`` package, with named signals.
+    """Linearised rig as state space of the ``control`` package, with named signals; arguments as for `state_space`.
 
     Raises
     ------

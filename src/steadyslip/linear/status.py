@@ -26,13 +26,13 @@ from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.model.range import in_range
 
-ON_THE_EDGE = 1e-9  # damping ratio, and static stiffness relative to its terms, below which a rig is on the edge
+ON_THE_EDGE = 1e-9  # damping ratio, and static stiffness relative to its terms, below which a rig is on an edge
 LAST_DIGITS = 24  # copies of a rig with perturbed last digits; by trial: computing time against a missed change
 ABSENT, STABLE, UNSTABLE, UNKNOWN, UNDAMPED = range(5)
 WORDS = ("no steady sliding", "stable", "unstable", "out of range", "undamped")
-"""Names of the status values; "out of range" means the range of floating point, "undamped" that nothing grows."""
+"""Names of the status values; "out of range" refers to floating point, "undamped" means that no disturbance grows."""
 QUIET = (STABLE, UNDAMPED)
-"""Where no disturbance grows."""
+"""Status values with which no disturbance grows."""
 EVERY, NONE = "stable at every stiffness", "stable at no stiffness"
 
 
@@ -51,8 +51,8 @@ def stability(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     str, ndarray of str or xarray.DataArray
         ``stable``, ``unstable`` (ill-posed included), ``undamped`` (nothing damps a machine, and nothing grows),
         ``no steady sliding`` (lock-up or lift-off), or ``out of range`` where numbers leave the range of floating
-        point, so that nothing can be said. Within rounding of an edge the
-        word is that of one side; `analyze` says so.
+        point, so that stability is not known. Within rounding of an edge the
+        word is that of one side; `analyze` reports such an edge.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def stability(rig: Slider | Machine, vary: Vary | None = None) -> Any:
 
 
 def without_edge(point: OperatingPoint) -> NDArray[np.str_]:
-    """Text (...) that explains why a rig has no critical stiffness; empty where it has one."""
+    """Text (...): reason why a rig has no critical stiffness; empty where it has one."""
     found = status(point)
     with np.errstate(all="ignore"):
         low, high = interval_ends(point)
@@ -95,7 +95,7 @@ def status(point: OperatingPoint) -> NDArray[np.int64]:
 
 
 def status_where_counted(point: OperatingPoint) -> NDArray[np.int64]:
-    """As `status`; UNKNOWN also where roots under delays cannot be counted, which `status` refuses."""
+    """Status of rigs (...) as `status`, but UNKNOWN where roots under delays cannot be counted (`status` raises)."""
     with np.errstate(all="ignore"):
         return np.where(can_be_counted(point), _status(point, is_stable(point, unless_long=True)), UNKNOWN)
 
@@ -108,10 +108,10 @@ def _status(point: OperatingPoint, stable: NDArray[np.bool_]) -> NDArray[np.int6
 def decided_by_rounding(point: OperatingPoint) -> bool:
     """True if changes in the last digits of a single rig's numbers change its status.
 
-    They do at an edge, and where terms cancel that are many orders of magnitude larger than their sum; not where
-    another disturbance grows anyway.
+    That is so at an edge, and if terms cancel that are many orders of magnitude larger than their sum; not if another
+    disturbance grows anyway.
     """
-    if np.any(digits_lost(point)):  # then eigenvalues come from many digits, which no array of rigs has
+    if np.any(digits_lost(point)):  # its eigenvalues are computed with many digits, which arrays do not allow
         return False
     chance = np.random.default_rng(0)
     arguments = [
@@ -161,7 +161,7 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
         edge = np.array(np.broadcast_to(undamped | neutral, point.shape))
         if point.single or len(point.shape) != 1:
             return edge & ~outgrown(point, neutral, ON_THE_EDGE) if np.any(edge) else edge
-        rows = np.flatnonzero(edge)  # few of many, whose eigenvalues take long with a delay
+        rows = np.flatnonzero(edge)  # only a few, as eigenvalues take long with a delay
         if rows.size:
             edge[rows] = ~outgrown(point.part(rows), np.broadcast_to(neutral, point.shape)[rows], ON_THE_EDGE)
         return edge

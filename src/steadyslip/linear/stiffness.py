@@ -1,9 +1,9 @@
 """Critical stiffness, stable stiffness, eigenvalues: for one rig or for arrays of any parameters.
 
-Rigs with one memory variable go through the cubic in closed form, which is fast and keeps its digits where a large mass
-swamps the rest; all others through the Model's characteristic polynomial p(s) + k q(s), split in symbols; what has a
-delay through `linear_sets`, which splits in numbers and serves every parameter that enters linearly. The routes agree
-to rounding (tests).
+Three methods: for rigs with one memory variable the cubic in closed form, which is fast and loses no digits if the mass
+is large; for other rigs the Model's characteristic polynomial p(s) + k q(s), split in symbols; with a delay
+`linear_sets`, which splits numerically and handles every parameter that enters linearly. Their results agree to
+rounding (tests).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from steadyslip.model.steady import steady_equation
 STIFFNESS = "slider.stiffness"
 ONE_STIFFNESS = slider("of a machine's stiffnesses safety_factor and stable_values tell, each by its name")
 _CHUNK = 32768  # rigs at a time, 256 KiB per array of doubles, so that intermediate arrays stay in the cache
-_LEAST = 1e-290  # products smaller than this (or larger than its inverse) go through the general route; doubles: 1e-308
+_LEAST = 1e-290  # smaller products (or larger than the inverse) use the general method; doubles end at 1e-308
 
 
 @checked(rig=ONE_STIFFNESS)
@@ -88,8 +88,8 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
 def own_safety_factor(point: OperatingPoint) -> Array:
     """Safety factor of sliders, (...): stiffness k + kp over its critical value, with the gain kp of a controller.
 
-    The critical value may be below kp, where the gain is more than enough alone; not with a delay, where a gain is no
-    stiffness.
+    The critical value may be below kp, if the gain alone is more than enough; not with a delay, as a delayed gain is
+    not a stiffness.
     """
 
     def kernel(part: OperatingPoint) -> Array:
@@ -153,7 +153,7 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
         floating point (see `stability`), and for the root that a rig lacks when its mass is zero. With a delay, which
         makes infinitely many, the rightmost, as many as there are without it; NaN, with an `IllPosedWarning`, where
         infinitely many grow (on a body without mass, what acts late outweighs what acts at once), and, with an
-        `UndecidedWarning`, for those that are not told from infinitely many that lie nearly alike.
+        `UndecidedWarning`, for eigenvalues that cannot be separated from infinitely many others close to them.
 
     Examples
     --------
@@ -200,9 +200,9 @@ def growth_rate(rig: Slider | Machine, vary: Vary | None = None) -> Any:
 
     inf where the problem is ill-posed (theory 3: a3 < 0, or a3 = 0 and a2 <= 0), NaN without steady sliding and where
     numbers leave the range of floating point (see `stability`). Where a highest derivative is delayed (a body without
-    mass under a late controller, say) there may be no slowest decay, only infinitely many that come as near to one rate
-    as one likes; then it is that rate, for the given delays or others as near as one likes to them, and NaN where that
-    rate is not known to a thousandth.
+    mass under a late controller, for example) there may be no slowest decay, only infinitely many rates with a limit.
+    The result is that limit, for the given delays or delays arbitrarily near them, and NaN if the limit is not known to
+    a thousandth.
 
     Examples
     --------
@@ -248,7 +248,7 @@ def _total_ends(point: OperatingPoint) -> tuple[Array, Array]:
 def general_set(point: OperatingPoint, *, edges: bool = False) -> StableSet:
     """Stable set in stiffness from the characteristic equation of any Model; with a delay intervals only.
 
-    With `edges` ends of these that are no edges are NaN, as in `sets_of`.
+    With `edges` an end at which only the searched range ends is NaN, as in `sets_of`.
     """
     if point.model.delays:
         nothing = np.empty(0)
@@ -316,7 +316,7 @@ def interval_ingredients(model: Model) -> tuple[sp.Expr, ...]:
 
 @cached
 def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
-    """Function of a point that gives where steady sliding exists, then the numbers of `interval_ingredients`."""
+    """Function of a point that returns True where steady sliding exists, then the values of `interval_ingredients`."""
     wanted = interval_ingredients(model)
     equation = steady_equation(model)
     arguments = list(model.parameters.values())
@@ -382,7 +382,7 @@ def set_of_one(point: OperatingPoint) -> StableSet:
 
 
 def interval_ends(point: OperatingPoint, *, edges: bool = False) -> tuple[Array, Array]:
-    """Lower and upper ends of the stable intervals, (..., m); with `edges` NaN where they are none, as in `sets_of`."""
+    """Lower and upper ends of the stable intervals (Pa/m), (..., m) each; `edges` as in `sets_of`."""
     if has_closed_form(point.model):
         low, high = closed_form_interval(point)
         return np.asarray(low)[..., None], np.asarray(high)[..., None]
@@ -415,7 +415,7 @@ def in_chunks(point: OperatingPoint, kernel: Callable[[OperatingPoint], NDArray[
     Raises
     ------
     NotAvailable
-        If a single rig leaves it.
+        If the numbers of a single rig leave the range of floating point.
     """
     if not point.shape:
         require_range(point)

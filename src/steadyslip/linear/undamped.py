@@ -1,4 +1,4 @@
-"""Rigs that nothing damps (theory 13): whether they are so, and whether one of their roots grows."""
+"""Undamped rigs (theory 13): test for them, and test for growing roots."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from steadyslip.model.range import characteristic
 
 
 def is_undamped(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where a characteristic polynomial has even powers of s only, one beside the constant at least, (...).
+    """True (...) where the characteristic polynomial has even powers of s only, with at least one above s^0.
 
-    Not of a slider: one body in one direction couples with nothing.
+    False for a slider, which has a single oscillation that cannot couple with another.
     """
     if point.model.is_single or point.model.delays or not is_written_out(point.model):
         return np.zeros(point.shape, dtype=bool)

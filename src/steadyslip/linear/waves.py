@@ -19,7 +19,7 @@ _EPS = float(np.finfo(float).eps)
 _ROUNDING = 64 * _EPS  # rounding of a value f(ω), relative to the sum of the sizes of its terms
 _CANCELLED = 8 * _EPS  # coefficients below this, relative to the sizes of the products added, are set to zero
 _NARROW = 1e-13  # relative width at which halving ends: what is left is one zero, or two that nearly coincide
-_MOST = 400_000  # intervals at a time before the search gives up; by trial: memory against how long a delay may be
+_MOST = 400_000  # largest number of intervals at a time; by trial: memory against the length of delays
 _OCTAVES = 60  # zeros are searched down to 2**-60 of the highest frequency, beyond the digits of a double
 
 

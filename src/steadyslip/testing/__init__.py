@@ -1,4 +1,4 @@
-"""Public checks of the contract that friction and contact laws keep, for authors of laws.
+"""Public checks of the contract for friction and contact laws, for authors of laws.
 
 ::
 

@@ -142,7 +142,7 @@ class SymbolicContactLaw:
         require_known_symbols(contact, "normal_stress", self.stress, [*self.inputs, *self.numbers])
 
     def at(self, motion: ContactInputs) -> Any:
-        """Normal stress (Pa) to fifty digits, for a Motion of numbers."""
+        """Normal stress (Pa) to fifty digits, for numeric `ContactInputs`."""
         function = precise_function(self.contact, [*self.inputs, *self.numbers], [self.stress])
         return function(*motion_values(motion), *self.numbers.values())[0]
 
@@ -179,7 +179,7 @@ def check_contact_names(contact: ContactLaw, surroundings: Surroundings = DEFAUL
 
 
 def check_lock_up(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
-    """Check that `lock_up` is a text whose only gaps are {inverse}, 1/μss, and {angle}, arccot μss in degrees.
+    """Check that the only placeholders in the text `lock_up` are {inverse}, 1/μss, and {angle}, arccot μss in degrees.
 
     Examples
     --------
@@ -291,7 +291,7 @@ def check_linearisation(contact: ContactLaw, surroundings: Surroundings = DEFAUL
 def _displaced(
     place: Surroundings, contact: ContactLaw, sigma: float, x: Any, v: Any, acceleration: Any
 ) -> ContactInputs:
-    """Motion displaced from steady sliding by x (m), at velocity v and an acceleration; forces from the balance."""
+    """Motion displaced by x (m) from steady sliding, at v (m/s) and acceleration (m/s²); forces from the balance."""
     rest = place.steady_motion(contact, sigma)
     with mpmath.workdps(DIGITS):
         spring = rest.spring - mpmath.mpf(place.stiffness) * x - place.damping * (v - mpmath.mpf(place.velocity))

@@ -23,8 +23,8 @@ from steadyslip.testing.precise import (
 )
 
 FACTORS = (1.0, 0.01, 100.0)  # velocities at which states are checked, over that of the drive
-STEP = 1e-6  # step of one-sided differences over the natural size of a variable
-SLOPE_TOLERANCE = 1e-4  # allowed error of these slopes over the largest: a hundred steps, far below any kink
+STEP = 1e-6  # step of one-sided differences, relative to the natural scale of a variable
+SLOPE_TOLERANCE = 1e-4  # allowed error of derivatives over the largest: 100 steps, far below the jump at a kink
 
 
 def check_contact_states(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
@@ -123,10 +123,10 @@ def _faster(motion: Any) -> Any:
 def _require_effect(contact: ContactLaw, symbolic: SymbolicContactLaw, rates: tuple[sp.Expr, ...]) -> None:
     """Require that every state changes the normal stress, directly or through other states."""
     by_state = dict(zip(symbolic.motion.memory, rates, strict=True))
-    felt = {m for m in by_state if m in symbolic.stress.free_symbols}
+    effective = {m for m in by_state if m in symbolic.stress.free_symbols}
     for _ in by_state:
-        felt |= {m for m in by_state for other in felt if m in by_state[other].free_symbols}
-    lost = [name for name, m in zip(contact.memory(), by_state, strict=True) if m not in felt]
+        effective |= {m for m in by_state for other in effective if m in by_state[other].free_symbols}
+    lost = [name for name, m in zip(contact.memory(), by_state, strict=True) if m not in effective]
     require(not lost, contact, f"nothing depends on {', '.join(lost)}; leave it out, or let the normal stress feel it")
 
 

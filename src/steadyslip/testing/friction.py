@@ -262,15 +262,15 @@ def check_numbers(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS)
                 )
 
 
-_VELOCITY_JUMP, _STRESS_JUMP = 3.0, 1.5  # value after over before: far from small, within the range of most laws
-_RAMP_DURATION = 1e-3  # duration of the ramp over the fastest relaxation time
+_VELOCITY_JUMP, _STRESS_JUMP = 3.0, 1.5  # ratio of values after and before: not small, within the range of most laws
+_RAMP_DURATION = 1e-3  # duration of the ramp relative to the fastest relaxation time
 _HALVING_RATIO = 0.6  # a change of first order halves with the duration; 0.1 is left for second order
 
 
 def check_jumps(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
     """Check that memory is continuous when normal stress or velocity jump, and that strength follows at once.
 
-    The rates are integrated through a smooth ramp of ever shorter duration: the change of each memory
+    The rates are integrated through two smooth ramps, one half as long as the other: the change of each memory
     variable must vanish with the duration at first order, and the strength at the end must tend to
     strength(v2, σ2, memory before the jump).
 

@@ -1,7 +1,7 @@
-"""Laws in symbols, evaluated to fifty digits, and the comparisons that all checks use.
+"""Symbolic laws evaluated to fifty digits, and comparisons used by all checks.
 
-Fifty digits remove rounding: a correct law misses its steady state by 1e-40 of the terms that cancel, a wrong one by a
-visible part of them, so that a tolerance between the two needs no tuning.
+With fifty digits rounding is negligible: relative to the terms that cancel, the error at the steady state is 1e-40 for
+a correct law and far above `TOLERANCE` for a wrong one, so that the tolerance needs no tuning.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ TOLERANCE = mpmath.mpf("1e-9")
 
 
 class ContractViolation(SteadyslipError, AssertionError):
-    """A law breaks a rule of the contract; the message names it, with numbers, and what to do."""
+    """Error: a law breaks a rule of the contract. The message names the rule, the numbers and the remedy."""
 
 
 def require(condition: Any, law: FrozenRecord, message: str) -> None:
@@ -82,7 +82,7 @@ def call_with_symbols(law: FrozenRecord, what: str, method: Callable[..., Any], 
 
 
 def require_known_symbols(law: FrozenRecord, what: str, expression: sp.Expr, allowed: Sequence[sp.Symbol]) -> None:
-    """Expressions may depend on what the method was given and on nothing else, by functions that are supported."""
+    """Raise `ContractViolation` unless an expression contains only `allowed` symbols and supported functions."""
     foreign = sorted(str(s) for s in expression.free_symbols - set(allowed))
     foreign += sorted(str(d) for d in expression.atoms(sp.Derivative, sp.core.function.AppliedUndef))
     require(
@@ -140,12 +140,12 @@ def _precise(number: Any) -> mpmath.mpf:
 def disagreement(
     function: Callable[[Any], Any], derivative: Any, at: Any, scale: Any, terms: Any = 0
 ) -> tuple[mpmath.mpf, mpmath.mpf]:
-    """Central difference of a function at a point, and how far it is off the derivative beyond the allowed error.
+    """Central difference of a function at a point, and its error against `derivative` in excess of the allowed error.
 
     The error of a central difference with step h is c h² + O(h⁴); from steps h and h/2 the error of the
     second is a third of their difference. Three times that, and the rounding of fifty digits, is allowed; `terms` is
-    the size of terms that may cancel in the function. The bend f(x+h) − 2f(x) + f(x−h) over h must halve with h, else
-    there is a kink, where a symmetric difference may agree by chance.
+    the size of terms that may cancel in the function. The second difference f(x+h) − 2f(x) + f(x−h) over h must halve
+    with h; else there is a kink, at which a central difference may agree by chance.
     """
     with mpmath.workdps(DIGITS):
         step = mpmath.mpf("1e-8") * scale

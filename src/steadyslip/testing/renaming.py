@@ -1,4 +1,4 @@
-"""Checks of laws under random names: equations must not depend on how parameters and states are called."""
+"""Checks of laws under random names: equations must not depend on the names of parameters and states."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from steadyslip.testing.precise import require
 from steadyslip.testing.symbolic import DEFAULT_CONDITIONS, Conditions
 
 L = TypeVar("L", FrictionLaw, ContactLaw)
-# names with a meaning in equations, SymPy, printers or JavaScript, but not of any result
+# names with a meaning in equations, SymPy, printers or JavaScript, except names of results
 RESERVED_NAMES = (
     "w v_lp_dot q_dot p_dot v_lp q p T tau sigma k m c_0 y0 z0 in0 w_0 e0 D_0 a_x I_x sigma_ss mu_ss k_cr held loading "
     "E I N S pi oo gamma beta Lambda constructor toString arguments function var this eval select define Infinity"
@@ -28,7 +28,7 @@ RESERVED_NAMES = (
 
 
 def _new_names(law: FrictionLaw | ContactLaw, seed: int) -> tuple[dict[str, str], dict[str, str]]:
-    """Random new names by old name, of the parameters of a law and of its memory or states."""
+    """Random new names by old name: of the parameters of a law, and of its memory or states."""
     random = Random(f"{type(law).__name__} {seed}")
     own = [item.name for item in fields(law) if isinstance(role_of(item), Parameter)]
     taken = {*dir(law), *law.memory()}

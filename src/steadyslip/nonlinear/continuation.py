@@ -108,16 +108,16 @@ class SolutionCurve:
             try:
                 step = np.linalg.solve(matrix, right)
             except np.linalg.LinAlgError as error:
-                raise Failure("singular") from error
+                raise Failure("the Jacobian is singular") from error
             if not np.all(np.isfinite(step)):
-                raise Failure("not finite")
+                raise Failure("a Newton step is not finite")
             u = u - step
             size = float(np.max(np.abs(step) / np.maximum(1.0, np.abs(u))))
             stagnant = size > 0.3 * before
             rounded = stagnant and iteration > 2 and size <= self.rounding
             converged = size <= self.tolerance or (size < 10 * self.tolerance and stagnant) or rounded
             if self.size(u - guess) > (reach if converged else ASIDE * reach):
-                raise Failure("the equations lead elsewhere")
+                raise Failure("Newton's method leads too far from the predicted point")
             if converged:
                 along = np.zeros(len(u))
                 along[-1] = 1.0
@@ -127,7 +127,7 @@ class SolutionCurve:
             if size > 2.0 * max(before, NEARLY) and iteration > 2:
                 break
             before = size
-        raise Failure("no convergence")
+        raise Failure("Newton's method does not converge")
 
     def _approached(self, start: Array, moved: float, guess: Array, across: Array, reach: float) -> tuple[Array, float]:
         """Approximate solution by Broyden's method from the last Jacobian, and the size of its last step.
@@ -185,7 +185,7 @@ class SolutionCurve:
                 ahead = self.corrected(guess, here.tangent, here.length + step, reach)
                 turned = float(ahead.tangent @ (self.weights * here.tangent))
                 if turned < self.most_turn and step > 4 * least:
-                    raise Failure("turns too sharply")
+                    raise Failure("the curve turns too sharply")
                 if accept is not None:
                     accept(ahead)
             except Failure:

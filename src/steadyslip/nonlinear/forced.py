@@ -52,7 +52,7 @@ TIGHTER, TIGHTEST = 100, 1e-12  # factor by which rtol is reduced where integrat
 MOST_SHARE = 0.99  # largest amplitude tried for limits, over the input's steady value: just below a change of sign
 DECADES = 3  # decades of amplitude searched below MOST_SHARE, and as many again where needed
 STEPS = 12  # amplitudes tried upwards over that range, each 1.8 times the one before: a narrower window may be missed
-HALVINGS = 4  # bisections of the logarithm of amplitude within such a step: limits are right to 4 %
+HALVINGS = 4  # bisections of the logarithm of amplitude within a step of amplitude: limits are right to 4 %
 RISING = Measured(
     "numbers > 0 that rise", lambda given: _positive(given) and bool(np.all(np.diff(np.ravel(given)) > 0)), "s"
 )

@@ -265,8 +265,8 @@ class OnPores(Piece):
 class OnDrive(Piece):
     """Base of creep pieces: the stress of the drive is imposed, and its motion is free.
 
-    The piece adds to the stress at the drive's release if another piece releases the drive, and lasts until it moves
-    again; otherwise it adds to the stress in steady sliding, and the drive is free during the whole run.
+    If another piece (creep) releases the drive, the piece adds to the stress at release and ends with the release.
+    Otherwise it adds to the stress in steady sliding, and the drive is free during the whole run.
     """
 
     channel: ClassVar[int] = DISTURBANCE

@@ -197,12 +197,12 @@ class _Plane:
         given = {rig.parameter_along(name): pair for name, pair in between.items()}
         unknown = [name for name in given if name not in names]
         if unknown:
-            raise ParameterError([Problem(f"between.{n}", f"is not one of {' and '.join(names)}") for n in unknown])
+            raise ParameterError([Problem(f"between.{n}", f"allowed: {' and '.join(names)}") for n in unknown])
         self.logarithmic, self.scales, limits = [], [], []
         for name, role in zip(names, self.roles, strict=True):
             value = rig.parameters()[name].value
             if value is None:
-                raise ParameterError([Problem(name, "the rig does not have it; give it a value first")])
+                raise ParameterError([Problem(name, "missing in the rig; give it a value first")])
             positive = role.domain.low == 0 and not np.isfinite(role.domain.high) and value > 0
             size = abs(float(value)) or Search(rig, name, self.present, branch).natural_size()
             self.logarithmic.append(positive)
@@ -241,7 +241,7 @@ class _Plane:
         both = dict(zip(self.names, (first, second), strict=True))
         found = operating_point(self.rig, both, self.present, self.branch, scan=True)
         if not np.all(found.valid):
-            raise Failure("outside the domain")
+            raise Failure("parameters leave the domain of the rig")
         return found
 
     def _polynomials(self, u: Array) -> tuple[Array, Array]:

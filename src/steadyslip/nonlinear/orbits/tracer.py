@@ -336,7 +336,7 @@ class Tracer:
                     taken = point.length - here.point.length
                     idle = idle + 1 if taken <= step and taken < 1e-3 * LARGEST_STEP else 0
                     if idle > CREEP:
-                        raise Failure("steps stay tiny")
+                        raise Failure("steps along the branch stay tiny")
                     before, here, step, again = here, found[0], taken, True
                     curve.tolerance = self._curve(here).tolerance
                     yield before, here
@@ -466,7 +466,7 @@ class Tracer:
 
         ends = measure(near.point), measure(far.point)
         if ends[0] * ends[1] > 0:
-            raise Failure("not between")
+            raise Failure("the parameter value is not between those of the two cycles")
         curve = shooting.curve()
         close = curve.located(near.point, far.point, measure, *ends, width=1e-7)[1]
         guess = np.append(close.u[:-1], target)

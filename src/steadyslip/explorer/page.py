@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 from os import PathLike
 from typing import Any
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import BRANCH, NAME, checked
-from steadyslip.explorer.assembly import page
+from steadyslip.explorer.assembly import json_for_html, page, page_parts, style
 from steadyslip.files.html_document import HtmlDocument
 from steadyslip.files.specifications.read import text_of
 from steadyslip.machine.machine import Machine
@@ -36,14 +38,56 @@ class Explorer(HtmlDocument):
     def widget(self) -> Any:
         """Notebook widget of the page, with the page's values in ``widget.values`` and ``widget.rig``.
 
+        Setting ``values`` (by dotted name, SI units) changes the page; ``observe(f, "values")`` calls f on changes.
+
         Raises
         ------
         NotAvailable
             If anywidget is not installed.
         """
-        from steadyslip.explorer.widget import widget
+        made = _widget_class()
+        code, known = page_parts(self.rig, self.title, self.branch, self.text)
+        module = (
+            f"{code}const data = {json_for_html(known)};\n"
+            "export default { render: ({ model, el }) => render(model, el, data, programs, library) };\n"
+        )
+        own = type("ExplorerWidget", (made,), {"_esm": module, "_css": style()})
+        return own(self.rig, values={one["name"]: one["value"] for one in known["parameters"]})
 
-        return widget(self.rig, self.title, self.branch, self.text)
+
+@cache
+def _widget_class() -> type:
+    try:
+        import anywidget
+        import traitlets
+    except ImportError:
+        raise NotAvailable("widgets need anywidget; install it with: pip install 'steadyslip[notebook]'") from None
+
+    class ExplorerWidget(anywidget.AnyWidget):
+        """Widget of a rig, with the values on its page."""
+
+        values = traitlets.Dict().tag(sync=True)
+
+        def __init__(self, rig: Slider | Machine, **options: Any) -> None:
+            self._origin = rig
+            super().__init__(**options)
+
+        @traitlets.validate("values")
+        def _checked(self, proposal: Any) -> dict[str, float]:
+            """All values after some have changed; raises ParameterError for a value that the rig does not allow."""
+            known = getattr(self, "values", None) or {}
+            together = {**known, **proposal["value"]}
+            changed = {name: value for name, value in together.items() if value != self._origin.value(name)}
+            self._origin.with_values(changed)
+            return {name: float(value) for name, value in together.items()}
+
+        @property
+        def rig(self) -> Slider | Machine:
+            """Rig with the values on the page."""
+            changed = {n: v for n, v in self.values.items() if v != self._origin.value(n)}
+            return self._origin.with_values(changed) if changed else self._origin
+
+    return ExplorerWidget
 
 
 @checked(title=NAME, branch=BRANCH)

@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 
 import lab_records as lab
 import steadyslip as ss
+from displacements_at_random import KINDS, drawn, outcome
 from servo_records import record as servo_record
 from steadyslip.experiments.loading.across import yielding
 from steadyslip.experiments.loading.kinks import load_course
@@ -84,6 +85,29 @@ def test_a_sensor_that_slips_is_told_from_the_fault(seed):
     moved[chance.integers(0, len(moved), 3)] += chance.choice([-3e-6, 4e-6], 3)
     columns = {name: getattr(found, name) for name in ("time", "friction", "normal")}
     assert spring(ss.record_from_arrays(**columns, displacement=moved)) is None
+
+
+@pytest.mark.parametrize(("kind", "which"), [("soft, lag, across", 7), ("soft, overshoot, across", 5)])
+def test_steps_are_found_with_friction_beside_them(kind, which):
+    """On soft presses the fault's own motion made a servo, pieces or no change, and k up to ten times its truth."""
+    *_, one = drawn(kind, which + 1, 1)
+    assert spring(one.record) == pytest.approx(one.rig.value("slider.stiffness"), rel=0.1)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("kind", KINDS)
+def test_displacements_of_the_fault_and_the_load_point_at_random(kind):
+    """Of 20 of each kind at most one is taken for the other."""
+    found = [spring(one.record) for one in drawn(kind, 20, 2)]
+    assert sum((one is None) == ("across" in kind) for one in found) <= 1
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if "across" in kind])
+def test_fits_along_the_fault_have_the_stiffness_of_the_press(kind):
+    found = [outcome(one) for one in drawn(kind, 4, 3)]
+    assert not [(ratio, z) for ratio, z, _, named in found if abs(z) > 3 and not named]
+    assert np.median([ratio for ratio, *_ in found]) == pytest.approx(1, abs=0.05)
 
 
 @pytest.mark.campaign

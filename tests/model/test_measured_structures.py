@@ -13,6 +13,8 @@ from steadyslip.core.errors import UnitWarning
 from steadyslip.linear import UndecidedWarning
 from steadyslip.machine import Machine, Pull, ResponseData, StructureBody, StructurePoint, Surface
 from steadyslip.model.numeric.measured import measured_machine
+from steadyslip.model.numeric.sampled_response import determinant, inverse, product
+from steadyslip.verdict import measured as verdict
 from structures_at_random import reed, reed_file
 
 LOAD = "contacts.tip.contact.steady_normal_stress"
@@ -97,6 +99,38 @@ def test_near_an_edge_noise_leaves_the_verdict_open(rough):
     assert found.stable is None
     assert "errors of the response near 72" in found.reason
     assert str(found).startswith("NOT DECIDED")
+
+
+def test_a_growth_rate_that_errors_may_turn_is_that_of_the_modes_or_not_decided(monkeypatch):
+    """By turns the pair grows at 11.8 ± 12.2 1/s; the modes, fitted to all lines, know it within half a percent."""
+    machine = by_response(reed_response(reed_band(), 0.01, np.random.default_rng(0)))
+    by_turns, error = measured_machine(machine).root()
+    assert error > by_turns.real
+    root, error = verdict.growing_root(machine)
+    assert abs(root - (12.4673358145 + 4565.039870161j)) < error < 0.5
+    assert verdict.doubt_of_growth(machine) == ""
+
+    def unknown(_):
+        raise ss.NotAvailable("no sum of modes describes it")
+
+    monkeypatch.setattr(verdict, "modal_machine", unknown)
+    found = ss.analyze(machine)
+    assert found.stable is None
+    assert "near 726.7 Hz leave open whether a pair of roots grows, at 11.78 1/s ± 12.18 1/s" in found.reason
+
+
+def test_a_response_is_laid_out_once(exact):
+    body = by_response(exact).bodies["reed"]
+    assert body.data is body.data
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4])
+def test_many_small_matrices_are_multiplied_and_inverted(size):
+    a, b = noisy(np.random.default_rng(size), (2, size, size, 7))
+    last = [np.moveaxis(one, -1, 0) for one in (a, b)]
+    np.testing.assert_allclose(np.moveaxis(product(a, b), -1, 0), last[0] @ last[1], rtol=1e-12)
+    np.testing.assert_allclose(determinant(a), np.linalg.det(last[0]), rtol=1e-10)
+    np.testing.assert_allclose(np.moveaxis(inverse(a), -1, 0), np.linalg.inv(last[0]), rtol=1e-9)
 
 
 @pytest.mark.parametrize(("part", "said"), [

@@ -19,6 +19,7 @@ from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
 
 _DECADES, _PER_DECADE, _EVEN = 2, 10, 61  # values at which roots are counted; of a bounded domain evenly spaced ones
 _HALVINGS = 14  # of what lies between two values: to 1e-5 of them
+_SHARE = 0.02  # of a range that errors leave open, to which its ends are found: errors are hardly known better
 _NEWTON = 30  # most steps of Newton's method; from a bracket of 1e-5 a few do
 _STEP = 1e-7  # relative, of differences: the root of rounding
 _LAST = 1e-12  # relative step at which Newton's method has ended
@@ -91,11 +92,12 @@ class MeasuredSearch:
     def _edge(self, low: float, high: float, below: int, above: int) -> Boundary:
         """Edge between two values of different status, in the narrowest bracket that errors of the response leave."""
         outer = low, high
-        for _ in range(_HALVINGS):
+        for cut in range(_HALVINGS):
             middle = 0.5 * (low + high)
             status = self._status(middle)
             if status == UNKNOWN:
-                low, high = self._last(low, middle, below), self._last(high, middle, above)
+                left = _HALVINGS - cut
+                low, high = self._last(low, middle, below, left), self._last(high, middle, above, left)
                 break
             low, high = (middle, high) if status == below else (low, middle)
         value, beta = self._polished(low, high, outer)
@@ -105,9 +107,12 @@ class MeasuredSearch:
         area = self.machine.printed_area(self.name)
         return Boundary(self.name, value, bracket, kind, beta, stable, self.role.unit, area)
 
-    def _last(self, sure: float, open_: float, status: int) -> float:
-        """Value nearest to one whose status is open that surely has a status."""
-        for _ in range(_HALVINGS):
+    def _last(self, sure: float, within: float, status: int, halvings: int) -> float:
+        """Value that surely has a status, next to the open ones around `within`: to `_SHARE` of their range."""
+        open_ = within
+        for _ in range(halvings):
+            if abs(open_ - sure) <= _SHARE * abs(within - open_):
+                break
             middle = 0.5 * (sure + open_)
             sure, open_ = (middle, open_) if self._status(middle) == status else (sure, middle)
         return sure

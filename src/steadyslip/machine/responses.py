@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.pages import Displayed
+from steadyslip.machine.structure_data import StructureData
 
 _OF_PHASE = 0.05  # rad; phase error of careful measurements
 MOST_LINES = 2**19
@@ -89,6 +90,12 @@ class ResponseData(Displayed):
         rows = dict(zip(self.names, np.eye(len(self.names)), strict=True))
         ends = dict.fromkeys(name.rpartition(".")[0] for name in self.names)
         return {end: (rows.get(f"{end}.x"), rows.get(f"{end}.y")) for end in ends}
+
+    @cached_property
+    def placed(self) -> StructureData:
+        """What tells where the points are: unit matrices over the names, and the rows of `points`."""
+        one = np.eye(len(self.names))
+        return StructureData(one, 0 * one, one, 0 * one, self.points(), self.source)
 
     @cached_property
     def _digest(self) -> str:

@@ -284,8 +284,7 @@ class StructureBody(Body, name="structure"):
     def _read(self) -> StructureData:
         """Data of the file, not reduced; for a response dummy matrices with its points."""
         if self.response is not None:
-            one = np.eye(len(self.response.names))
-            return StructureData(one, 0 * one, one, 0 * one, self.response.points(), self.response.source)
+            return self.response.placed
         found = self.matrices if self.modes is None else self.modes
         if found is None:
             raise ParameterError([Problem("matrices", _ONE)])

@@ -37,7 +37,7 @@ from steadyslip.verdict.analysis import Analysis
 from steadyslip.verdict.causes import undecided_without_mass
 from steadyslip.verdict.checks import edge_checks, undecided, verdict_checks
 from steadyslip.verdict.matrix_checks import is_on_edge, matrix_checks, matrix_edge_checks, matrix_numbers
-from steadyslip.verdict.measured import response_numbers
+from steadyslip.verdict.measured import doubt_of_growth, response_numbers
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import reason as slider_reason
 
@@ -188,8 +188,8 @@ def _judged_by_response(rig: Any, kicks: Sequence[str]) -> Analysis:
     if kicks:
         raise NotAvailable("kicks are not offered for a structure given by its measured response")
     found = measured_machine(rig)
-    if found.count.growing is None:
-        return Analysis(rig=rig, stable=None, reason=UNDECIDED + found.count.doubt)
+    if doubt := found.count.doubt or doubt_of_growth(rig):
+        return Analysis(rig=rig, stable=None, reason=UNDECIDED + doubt)
     distances, missing = margins_and_missing(rig)
     steady = steady_machine(rig)
     answer = _explained(

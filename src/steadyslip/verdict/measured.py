@@ -25,10 +25,39 @@ _UNLIKE = (
 _COUNTED = {0: "no root grows", 1: "a root grows without oscillating", 2: "a pair of roots grows"}
 
 
+def growing_root(machine: Machine) -> tuple[complex | None, float]:
+    """Growing root (1/s) of a machine of which one pair grows, and by how much errors may move it.
+
+    By the determinant or, where errors may make that root decay, by the modes. None where neither finds it.
+    """
+    found = measured_machine(machine)
+    own = found.root()
+    if own[0] is None or own[1] < own[0].real:
+        return own
+    try:
+        modal = modal_machine(machine)
+    except NotAvailable:
+        return own
+    first = next(iter(modal.roots()), 0j)
+    root, error = modal.root_near(complex(first.real, abs(first.imag))) if first.real > 0 else (first, math.inf)
+    return (root, _SURE * error) if _SURE * error < root.real else own
+
+
+def doubt_of_growth(machine: Machine) -> str:
+    """Why a growing pair that was counted may decay all the same; empty where it surely grows, or none was counted."""
+    root, error = growing_root(machine) if measured_machine(machine).count.growing == 2 else (None, 0.0)
+    if root is None or error < root.real:
+        return ""
+    return (
+        f"errors of the response near {format_quantity(abs(root.imag) / (2 * np.pi), 'Hz')} leave open whether a pair "
+        f"of roots grows, at {format_growth(root.real)} ± {format_growth(error)}: measure with more averages there"
+    )
+
+
 def response_numbers(found: MeasuredMachine) -> dict[str, Any]:
     """Fields of `Analysis` by name from a count of growing roots; with the eigenvalue where one pair grows."""
     growing = found.count.growing
-    root = found.root()[0] if growing == 2 else None
+    root = growing_root(found.machine)[0] if growing == 2 else None
     if not found.contacts.posed:
         return {"stable": False} | rates_of((), math.inf)
     counted = {"stable": growing == 0, "unstable_roots": growing}
@@ -49,7 +78,7 @@ def response_facts(machine: Machine, margins: Sequence[Margin]) -> list[tuple[st
         "the response", f"{len(own.omega)} frequencies from {ends[0]} to {ends[1]}; {counted}, by the turns of "
         "det(I + R G) round 0. That the structure is stable with open contacts is taken for granted",
     )]  # fmt: skip
-    root, error = found.root() if growing == 2 else (None, 0.0)
+    root, error = growing_root(machine) if growing == 2 else (None, 0.0)
     if root is not None and error > _REPORTED * root.real:
         rows += [("its growth rate", f"{format_growth(root.real)} ± {format_growth(error)}")]
     rows += [("its modes", _by_modes(machine, margins))]

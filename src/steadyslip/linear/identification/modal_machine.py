@@ -70,8 +70,8 @@ class ModalMachine:
 
     def _inner(self, s: complex) -> ComplexArray:
         """Matrix I + R G at s (1/s)."""
-        found = self.measured.seen(self._receptance(s)[None]) @ self.measured.contacts(np.array([s]))
-        return np.asarray(np.eye(self.measured.contacts.size) + found[0])
+        seen = self.measured.seen(self._receptance(s)[..., None])[..., 0]
+        return np.asarray(np.eye(len(seen)) + seen @ self.measured.contacts(np.array([s]))[..., 0])
 
     def _receptance(self, s: complex) -> ComplexArray:
         used = self.measured.used
@@ -82,7 +82,7 @@ class ModalMachine:
         left, _, right = np.linalg.svd(self._inner(s))
         y, x = left[:, -1].conj(), right[-1].conj()
         used = self.measured.used
-        pushed = self.measured.contacts(np.array([s]))[0] @ x
+        pushed = self.measured.contacts(np.array([s]))[..., 0] @ x
         slopes = self.modes.total.derivatives(np.array([s]))[0][np.ix_(used, used)]
         rows = self.measured.rows[:, used]
         return y, x, np.asarray(np.einsum("i,ijn,j->n", y @ rows, slopes, rows.T @ pushed))

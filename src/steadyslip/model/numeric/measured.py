@@ -25,7 +25,13 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.model.numeric.balance import Balance
 from steadyslip.model.numeric.machine_matrices import MachineMatrices, Site, assemble
 from steadyslip.model.numeric.pencil import ComplexArray, pencils
-from steadyslip.model.numeric.sampled_response import ReceptanceSamples, polynomial_shares, product
+from steadyslip.model.numeric.sampled_response import (
+    ReceptanceSamples,
+    determinant,
+    inverse,
+    polynomial_shares,
+    product,
+)
 
 _SURE = 4.0  # deviations of complex errors: one in e^16 is larger
 _TURN = 1.2  # rad; largest change of the argument between two samples that counts as followed
@@ -88,19 +94,22 @@ class ContactStiffness:
         self.size, self.e, self.a, self.posed = size, e, a, bool(posed)
 
     def __call__(self, s: ComplexArray) -> ComplexArray:
-        """G at places s (p,), (p, 2 contacts, 2 contacts)."""
+        """G at places s (p,), (2 contacts, 2 contacts, p)."""
         first, second, rest = slice(0, self.size), slice(self.size, 2 * self.size), slice(2 * self.size, None)
-        p = s[:, None, None] * self.e - self.a
-        found = p[:, second, first] + s[:, None, None] * p[:, second, second]
+
+        def part(row: slice, column: slice) -> ComplexArray:
+            return np.asarray(s * self.e[row, column, None] - self.a[row, column, None])
+
+        found = part(second, first) + s * part(second, second)
         if len(self.e) > 2 * self.size:
-            kept = p[:, rest, first] + s[:, None, None] * p[:, rest, second]
-            found = found - product(p[:, second, rest], np.linalg.solve(p[:, rest, rest], kept))
+            kept = part(rest, first) + s * part(rest, second)
+            found = found - product(part(second, rest), product(inverse(part(rest, rest)), kept))
         return np.asarray(found)
 
     def storing(self, s: ComplexArray, whole: ComplexArray) -> ComplexArray:
         """Part of G = `whole` at places on the imaginary axis that stores and takes energy, and gives none."""
-        own = np.diagonal(whole, axis1=1, axis2=2) / s[:, None]
-        return np.asarray((np.maximum(own.real, 0) + 1j * own.imag)[..., None] * s[:, None, None] * np.eye(self.size))
+        own = np.einsum("iip->ip", whole) / s
+        return np.asarray((np.maximum(own.real, 0) + 1j * own.imag) * s * np.eye(self.size)[..., None])
 
 
 def _steady_stresses(site: Site) -> tuple[float, float]:
@@ -137,6 +146,8 @@ class MeasuredMachine:
         self.rows: Array = rows
         self.used: NDArray[np.bool_] = used
         self.samples: ReceptanceSamples = like.samples if like is not None and same else self._samples(used)
+        alike = like is not None and same and np.array_equal(rows, like.rows)
+        self._seen: ComplexArray = like._seen if like is not None and alike else self.seen(self.samples.receptance)
 
     def _samples(self, used: NDArray[np.bool_]) -> ReceptanceSamples:
         """Samples from zero on: below the band the structure is a spring, off by what its first octave changes."""
@@ -164,12 +175,12 @@ class MeasuredMachine:
             spread = np.broadcast_to(np.abs(r[second] - r[0]), below.shape)
             omega, r = np.concatenate([first * _BELOW, omega]), np.concatenate([below, r])
             error, between = np.concatenate([same, error]), np.concatenate([spread, between])
-        return ReceptanceSamples(omega, r, error, between)
+        return ReceptanceSamples(omega, *(np.ascontiguousarray(np.moveaxis(one, 0, -1)) for one in (r, error, between)))
 
     def seen(self, receptance: ComplexArray) -> ComplexArray:
-        """Receptance in slips and distances of the contacts, (p, 2 contacts, 2 contacts)."""
-        flat = receptance.reshape(len(receptance), -1) @ self._both.T
-        return flat.reshape(-1, self.contacts.size, self.contacts.size)
+        """Receptance (d, d, p) in slips and distances of the contacts, (2 contacts, 2 contacts, p)."""
+        size = self.contacts.size
+        return np.asarray((self._both @ receptance.reshape(self._both.shape[1], -1)).reshape(size, size, -1))
 
     def varied(self, name: str, value: float) -> MeasuredMachine:
         """The machine with another value (SI) of a parameter, which is not checked."""
@@ -198,10 +209,10 @@ class MeasuredMachine:
     def _followed(self) -> tuple[Array, ComplexArray, Array, Array]:
         """Frequencies, determinant, and how far noise and what lies between samples may move it, dense at its turns."""
         own = self.samples
-        omega, ratio, noise, between = own.omega, *self._determinants(own)
+        omega, ratio, noise, between = own.omega, *self._determinants(own, self._seen)
         for _ in range(_ROUNDS):
             size = np.abs(ratio)
-            steep = ~(np.abs(np.angle(ratio[1:] / ratio[:-1])) <= _TURN)
+            steep = ~_follows(ratio)
             bent = ~(np.abs(ratio[:-2] - 2 * ratio[1:-1] + ratio[2:]) <= _BENT * size[1:-1])
             steep[1:] |= bent
             steep[:-1] |= bent
@@ -209,27 +220,28 @@ class MeasuredMachine:
             if not at.size:
                 break
             middle = 0.5 * (omega[at] + omega[at + 1])
-            fresh = self._determinants(own.at(middle))
+            places = own.at(middle)
+            fresh = self._determinants(places, self.seen(places.receptance))
             omega = np.insert(omega, at + 1, middle)
             ratio, noise, between = (
                 np.insert(old, at + 1, new) for old, new in zip((ratio, noise, between), fresh, strict=True)
             )
         return omega, ratio, noise, between
 
-    def _determinants(self, at: ReceptanceSamples) -> tuple[ComplexArray, Array, Array]:
+    def _determinants(self, at: ReceptanceSamples, seen: ComplexArray) -> tuple[ComplexArray, Array, Array]:
         """det(I + R G), its surely largest error by noise, and that by what lies between samples, each (p,)."""
         g = self.contacts(1j * at.omega)
-        inner = np.eye(self.contacts.size) + product(self.seen(at.receptance), g)
-        ratio = np.linalg.det(inner)
-        by = np.swapaxes(product(g, np.linalg.inv(inner)), 1, 2).reshape(len(g), -1) @ self._both
-        slope = np.abs(by).reshape(at.error.shape) * np.abs(ratio)[:, None, None]
-        noise = _SURE * np.sqrt(np.sum((slope * at.error) ** 2, axis=(1, 2)))
-        return ratio, noise, np.sum(slope * at.between, axis=(1, 2))
+        inner = np.eye(len(g))[..., None] + product(seen, g)
+        ratio = determinant(inner)
+        by = np.swapaxes(product(g, inverse(inner) * ratio), 0, 1).reshape(self._both.shape[0], -1)
+        slope = np.abs(self._both.T @ by).reshape(at.error.shape)
+        noise = _SURE * np.sqrt(np.sum((slope * at.error) ** 2, axis=(0, 1)))
+        return ratio, noise, np.sum(slope * at.between, axis=(0, 1))
 
     def _doubt(self, omega: Array, ratio: ComplexArray, noise: Array, between: Array) -> str:
         """Why turns inside the band are not known; empty if they are."""
         far = ~(noise + between < np.abs(ratio))
-        far[1:] |= ~(np.abs(np.angle(ratio[1:] / ratio[:-1])) <= _TURN)
+        far[1:] |= ~_follows(ratio)
         if not np.any(far):
             return ""
         i = int(np.argmax(far))
@@ -259,9 +271,9 @@ class MeasuredMachine:
         part = slice(begin, max(int(np.searchsorted(own.omega, _FIRST * first)), begin + 4 * len(_POWERS)))
         columns = (own.omega[part, None] / first) ** np.array(_POWERS)
         inverse = np.linalg.pinv(columns)
-        for i in range(own.receptance.shape[1]):
-            found = inverse @ own.receptance[part, i, i].real
-            unsure = _SURE * np.sqrt(inverse[0] ** 2 @ own.error[part, i, i] ** 2)
+        for i in range(len(own.receptance)):
+            found = inverse @ own.receptance[i, i, part].real
+            unsure = _SURE * np.sqrt(inverse[0] ** 2 @ own.error[i, i, part] ** 2)
             if abs(found[0]) - unsure > _MASS * abs(found[1]) or not unsure < _VAGUE * found[1]:
                 return self._begins + _LOWER
         return ""
@@ -270,13 +282,13 @@ class MeasuredMachine:
         """Why turns beyond the band are not known; empty if they are."""
         own, last = self.samples, self.samples.omega[-1]
         top = own.omega >= last / 2
-        s, r = 1j * own.omega[top], self.seen(own.receptance[top])
-        g, one = self.contacts(s), np.eye(self.contacts.size)
-        without = np.linalg.det(one + product(r, self.contacts.storing(s, g)))
-        pushed = float(np.max(np.abs(np.linalg.det(one + product(r, g)) / without - 1)))
+        s, r = 1j * own.omega[top], self._seen[..., top]
+        g, one = self.contacts(s), np.eye(self.contacts.size)[..., None]
+        without = determinant(one + product(r, self.contacts.storing(s, g)))
+        pushed = float(np.max(np.abs(determinant(one + product(r, g)) / without - 1)))
         ends = f"the response ends at {_hertz(last)}"
         beyond = 1j * last * _BEYOND
-        rates = np.diagonal(self.contacts(beyond), axis1=1, axis2=2) / beyond[:, None]
+        rates = np.einsum("iip->ip", self.contacts(beyond)) / beyond
         if np.any(rates.real < -_ROUNDING * np.abs(rates)):
             return f"{ends}, above which friction still feeds vibrations: measure to higher frequencies"
         if not pushed < _PUSHED:
@@ -292,7 +304,7 @@ class MeasuredMachine:
         """Angles of the eigenvalues of I + R G at the end of the band, with the storing part of G there."""
         last = 1j * self.samples.omega[-1:]
         stored = self.contacts.storing(last, self.contacts(last))
-        return np.asarray(np.angle(1 + np.linalg.eigvals(self.seen(self.samples.receptance[-1:]) @ stored)))
+        return np.asarray(np.angle(1 + np.linalg.eigvals(self._seen[..., -1] @ stored[..., 0])))
 
     def _turn_beyond(self, last: complex) -> float:
         """Turn (rad) of the determinant from the end of the band to infinite frequency, where it is 1."""
@@ -317,13 +329,19 @@ class MeasuredMachine:
         spread = float(self.samples.omega[i + 1] - self.samples.omega[i - 2])
         if not 0 < s.real <= spread:
             return None, math.inf
-        _, noise, between = self._determinants(replace(at, omega=at.omega.real))
+        _, noise, between = self._determinants(replace(at, omega=at.omega.real), self.seen(at.receptance))
         return s, float((noise + between)[0] / abs(slope))
 
     def determinant(self, s: complex) -> complex:
         """det(I + R G) near the imaginary axis, R from a polynomial through the nearest samples."""
-        r = self.seen(self.samples.at(np.array([s / 1j])).receptance)
-        return complex(np.linalg.det(np.eye(self.contacts.size) + r @ self.contacts(np.array([s])))[0])
+        r = self.seen(self.samples.at(np.array([s / 1j])).receptance)[..., 0]
+        return complex(np.linalg.det(np.eye(self.contacts.size) + r @ self.contacts(np.array([s]))[..., 0]))
+
+
+def _follows(ratio: ComplexArray) -> NDArray[np.bool_]:
+    """True where a determinant (p,) turns by no more than `_TURN` to the next place, (p − 1,)."""
+    step = ratio[1:] * ratio[:-1].conj()
+    return np.asarray(step.real >= math.cos(_TURN) * np.abs(step))
 
 
 def _hertz(omega: float) -> str:

@@ -12,6 +12,7 @@ import steadyslip as ss
 from counting import count_differences
 from machines import at_random, rate_state, surface
 from machines_in_the_plane import in_the_plane
+from steadyslip.linear.coupling import search_for
 from steadyslip.linear.matrix_route import require_matrices
 from steadyslip.linear.matrix_search import MatrixSearch
 
@@ -56,11 +57,13 @@ def differences(machine):
     if len(own) != len(other) or abs(own[0] - other[np.argmin(abs(other - own[0]))]) > 1e-9 * abs(own[0]):
         found.append("eigenvalues")
     for margin in ss.margins(machine):
-        name, (low, high) = margin.parameter, margin.searched
+        name = margin.parameter
+        by_symbols = search_for(machine, name, machine.kept_zeros(), 0)  # which margins of large machines do not take
+        low, high = by_symbols.searched
         least = TINY * abs(margin.value)
         edges = [
             [(e.value, e.kind, e.stable) for e in several if low < e.value < high and not 0 < abs(e.value) < least]
-            for several in (margin.edges, MatrixSearch(machine, name).boundaries())
+            for several in (by_symbols.boundaries(None), MatrixSearch(machine, name).boundaries())
         ]
         alike = len(edges[0]) == len(edges[1]) and all(
             abs(a[0] - b[0]) <= 1e-6 * abs(a[0]) and a[1:] == b[1:] for a, b in zip(*edges, strict=True)

@@ -7,8 +7,12 @@ import steadyslip as ss
 from machines import stacked_pads
 from machines_both_ways import differences, machine_of, row_of_blocks
 from machines_in_the_plane import is_root
+from steadyslip.linear.boundary import _search
+from steadyslip.linear.coupling import search_for
 from steadyslip.linear.matrix_route import require_matrices
+from steadyslip.linear.matrix_search import MatrixSearch
 from steadyslip.model.numeric import by_matrices
+from steadyslip.verdict.matrix_checks import _growing_by_turns
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("row", 3), ("plane", 3)])
@@ -45,6 +49,31 @@ def test_rows_of_blocks_have_the_roots_of_typed_equations(count, everywhere):
     )
     at = ss.eigenvalues(machine, {edge.parameter: edge.value})
     assert abs(at[0].real) < 1e-9 * abs(at[0])
+
+
+@pytest.mark.parametrize("name", ["contacts.at-pad0.contact.normal_stiffness", "bodies.pad2.mass", "drive.velocity"])
+def test_edges_of_machines_without_a_written_polynomial_are_sought_by_matrices(name):
+    """Three pads have 15 states: on both routes edges are numbers, and alike; the onset stays with the equations."""
+    machine = stacked_pads(3)
+    assert not by_matrices(machine)
+    found = _search(machine, name, machine.kept_zeros(), 0)
+    assert isinstance(found, MatrixSearch)
+    assert not isinstance(_search(stacked_pads(2), "bodies.pad0.mass", (), 0), MatrixSearch)
+    own, other = found.boundaries(), search_for(machine, name, machine.kept_zeros(), 0).boundaries(None)
+    least = 1e-9 * found.value  # what lies nearer to zero is a zero that rounding hides
+    one, two = ([(edge.kind, edge.stable, edge.value) for edge in several if edge.value > least]
+                for several in (own, other))  # fmt: skip
+    assert [row[:2] for row in one] == [row[:2] for row in two]
+    assert one
+    np.testing.assert_allclose([row[2] for row in one], [row[2] for row in two], rtol=1e-8)
+
+
+def test_turns_that_rounding_makes_are_not_followed_for_long():
+    """A body that only friction holds: without contacts the slow end of the response is rounding."""
+    point = require_matrices(machine_of("plane", 14))
+    assert _growing_by_turns(point) is None
+    free = machine_of("plane", 23)
+    assert _growing_by_turns(require_matrices(free)) is None
 
 
 @pytest.mark.campaign

@@ -28,7 +28,9 @@ from steadyslip.linear.undamped import is_undamped
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
-from steadyslip.model.numeric import by_matrices, has_response
+from steadyslip.model.linearisation import is_written_out
+from steadyslip.model.numeric import by_matrices, has_response, in_numbers
+from steadyslip.model.numeric.machine_point import machine_point
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_digits, require_range
 
@@ -146,7 +148,19 @@ def searched(rig: Rig, name: str) -> tuple[float, float]:
 
 
 def _search(rig: Rig, name: str, present: tuple[str, ...], branch: int) -> Search | MatrixSearch | MeasuredSearch:
-    return _matrix_search(rig, name) if by_matrices(rig) else search_for(rig, name, present, branch)
+    if by_matrices(rig):
+        return _matrix_search(rig, name)
+    if isinstance(rig, Machine) and not (present or branch) and _is_numeric(rig, name):
+        return search_matrices(rig, name)
+    return search_for(rig, name, present, branch)
+
+
+def _is_numeric(machine: Machine, name: str) -> bool:
+    """True if edges come from numbers on either route: then by matrices, with fewer samples, no symbols to evaluate."""
+    own = operating_point(machine)
+    if is_written_out(own.model) or not (own.exists and in_numbers(machine)):
+        return False
+    return bool(machine.parameters()[name].value) and not machine_point(machine).balance.problem
 
 
 def _matrix_search(rig: Machine, name: str) -> MatrixSearch | MeasuredSearch:

@@ -68,7 +68,8 @@ def matrix_checks(point: MachinePoint, stable: bool, on_edge: bool) -> tuple[Che
 
 def _growing_by_turns(point: MachinePoint) -> int | None:
     """Number of growing roots: those of the machine without contact forces plus the turns of the contacts' return
-    difference; None if a root without contact forces lies on the imaginary axis, or the turns cannot be counted.
+    difference; None if a root without contact forces lies on the imaginary axis, the turns cannot be counted, or
+    contacts alone determine how some coordinate moves.
     """
     sites = tuple(replace(site, area=0.0) for site in point.matrices.sites)
     free = linearised(replace(point.matrices, sites=sites), point.balance)
@@ -76,7 +77,10 @@ def _growing_by_turns(point: MachinePoint) -> int | None:
     if np.any(np.abs(roots.real) <= ON_THE_EDGE * np.abs(roots)):
         return None
     change = change_between(free, [point.pencil])
-    more = 0 if change is None else Turns(change).more_growing(change.core_of(point.pencil))
+    try:
+        more = 0 if change is None else Turns(change).more_growing(change.core_of(point.pencil))
+    except np.linalg.LinAlgError:
+        return None
     return None if more is None else int(np.sum(roots.real > 0)) + more
 
 

@@ -27,6 +27,7 @@ _FAR = 1e12  # factor up to which frequencies are followed: a changed machine ma
 _SPARSE = 6  # places per decade there
 _TURN = 1.2  # rad; largest change of the argument between two places that counts as followed
 _ROUNDS = 24  # of halving between places until the argument is followed
+_MORE, _SOME = 4, 64  # times as many steep places as at first, or as some: made by rounding, as halving finds ever more
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,13 +137,16 @@ class Turns:
 
         Frequencies that it needs besides are kept: the next one along a parameter mostly needs the same.
         """
-        ratio = self.change.ratio(self.omega, self.response, core)
+        ratio, most = self.change.ratio(self.omega, self.response, core), 0
         for _ in range(_ROUNDS):
             turn = np.angle(ratio[1:] * np.conj(ratio[:-1]))
             steep = np.flatnonzero(~(np.abs(turn) <= _TURN))
             if not steep.size:
                 whole = (np.sum(turn) + self._ends(core, ratio)) / np.pi
                 return -round(float(whole)) if abs(whole - round(float(whole))) < 0.25 else None
+            most = most or _MORE * max(steep.size, _SOME)
+            if steep.size > most:
+                return None
             middle = np.sqrt(self.omega[steep] * self.omega[steep + 1])
             fresh = self.change.response(middle)
             self.omega = np.insert(self.omega, steep + 1, middle)

@@ -87,6 +87,16 @@ def test_a_mode_that_is_fed_is_asked_about(tmp_path):
         ss.read_rig(modal(tmp_path, "frequency,damping,tip.x,tip.y\n174,-0.01,0.001,11.9\n1090,0.007,0.01,-12\n"))
 
 
+def test_shapes_scaled_to_one_are_asked_about(tmp_path):
+    shapes = "frequency,damping{},tip.x,tip.y\n174,0.01{},0.01,1\n1090,0.007{},-1,{}\n"
+    with pytest.warns(UnitWarning, match=r"largest entry is 1 in every mode, no modal masses: are they scaled"):
+        ss.read_rig(modal(tmp_path, shapes.format("", "", "", "0.3")))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.read_rig(modal(tmp_path, shapes.format(",mass", ",0.02", ",0.03", "0.3")))
+        ss.read_rig(modal(tmp_path, shapes.format("", "", "", "1.2")))
+
+
 def test_a_point_that_does_not_move_across_a_stiff_contact_is_asked_about(tmp_path):
     with pytest.warns(UnitWarning, match=r"reed\.tip has none: is there a column or degree of freedom y of it"):
         ss.read_rig(modal(tmp_path, "frequency,damping,tip.x\n174,0.01,11.9\n1090,0.007,12\n"))

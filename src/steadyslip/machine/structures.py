@@ -239,6 +239,13 @@ class StructureBody(Body, name="structure"):
                 )
             if len(ratios) and np.min(ratios) >= _DAMPED:
                 yield f"modes: {of_modes.source!r} has damping ratios from {np.min(ratios):.3g}; {small}"
+            shapes = [row for pair in of_modes.points.values() for row in pair if row is not None]
+            scaled = bool(shapes) and len(ratios) > 1 and bool(np.all(np.max(np.abs(shapes), axis=0) == 1))
+            if scaled and np.all(np.diag(of_modes.mass) == 1):
+                yield (
+                    f"modes: {of_modes.source!r} has shapes whose largest entry is 1 in every mode, no modal masses: "
+                    "are they scaled to that? Give modal masses (kg) in a column mass, or shapes of unit modal mass"
+                )
             for (one, (_, y)), (other, (x, _)) in permutations(of_modes.points.items(), 2):
                 alone = of_modes.points[one][0] is None and of_modes.points[other][1] is None
                 if alone and y is not None and x is not None and SequenceMatcher(None, one, other).ratio() >= 0.5:

@@ -70,10 +70,9 @@ def test_edges_of_machines_without_a_written_polynomial_are_sought_by_matrices(n
 
 def test_turns_that_rounding_makes_are_not_followed_for_long():
     """A body that only friction holds: without contacts the slow end of the response is rounding."""
-    point = require_matrices(machine_of("plane", 14))
-    assert _growing_by_turns(point) is None
-    free = machine_of("plane", 23)
-    assert _growing_by_turns(require_matrices(free)) is None
+    with np.errstate(all="ignore"):  # as in `analyze`: the slow end overflows
+        assert _growing_by_turns(require_matrices(machine_of("plane", 14))) is None
+        assert _growing_by_turns(require_matrices(machine_of("plane", 23))) is None
 
 
 @pytest.mark.campaign

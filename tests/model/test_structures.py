@@ -340,7 +340,7 @@ def test_odd_modes_are_asked_about(tmp_path, names, ratio, said):
 
 @pytest.mark.parametrize(("right", "wrong", "said"), [
     ("matrices =", "matrix =", r"toml: line 4: bodies.reed.matrix: unknown key 'matrix'; did you mean 'matrices'\?"),
-    ('motion = "structure"\n', "", r"toml: line \d: bodies.reed.motion: missing; matrices and points are of"),
+    ('motion = "structure"\n', "", r"toml: line \d: bodies.reed.motion: missing; matrices and points are keys of"),
     ('"structure"', '"struct"', "motion: unknown motion 'struct'; did you mean 'structure'"),
 ])  # fmt: skip
 def test_of_a_misspelt_key_nothing_else_follows(tmp_path, right, wrong, said):

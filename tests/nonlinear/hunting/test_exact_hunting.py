@@ -94,7 +94,7 @@ def test_without_integral_it_rests_where_friction_holds():
     found = ss.hunt(axis(**THEORY | {"ki": 0.0}))
     assert found.hunts is False
     assert abs(found.error[-1]) * 3.0 <= 1.5
-    assert found.sentence == "SETTLES within 333.3 mm of the target after 41.42 s"  # it creeps up to Coulomb friction
+    assert found.sentence == "SETTLES within 333.3 mm of the target after 41.4 s"  # it creeps up to Coulomb friction
 
 
 def test_a_stiff_controller_stops_at_a_time():

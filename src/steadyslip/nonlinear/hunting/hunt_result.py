@@ -24,6 +24,7 @@ from steadyslip.nonlinear.hunting.stick_and_slip import STILL, Stroke, swings
 from steadyslip.protocol import Protocol
 
 SYMMETRIC = 1e-3  # relative difference of both sides below which one ± is printed: numbers have four digits
+SETTLED_DIGITS = 3  # of times until rest: an axis creeps there, so that rounding moves the time by 2e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,9 +128,9 @@ class Hunt(ReadOnly):
             where = f"on the target{self._beside}" if there else f"within {size} of the target"
             if not self.strokes and not there:
                 return f"DOES NOT MOVE: friction at rest holds it {size} from the target"
-            return f"SETTLES {where} after {format_quantity(self.settled_at, 's')}"
+            return f"SETTLES {where} after {format_quantity(self.settled_at, 's', SETTLED_DIGITS)}"
         if self.approached_at < self._end:
-            after = format_quantity(self.approached_at, "s")
+            after = format_quantity(self.approached_at, "s", SETTLED_DIGITS)
             return f"SETTLES on the target{self._beside}, within {size} of it after {after}"
         return f"SETTLES: within {size} of the target by {format_quantity(self._end, 's')}, in ever smaller strokes"
 

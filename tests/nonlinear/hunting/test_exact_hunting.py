@@ -214,7 +214,7 @@ def test_bristles_that_creep_to_the_target_settle():
     """)
     found = ss.hunt(axis)
     assert found.hunts is False
-    assert found.sentence == f"SETTLES on the target after {found.settled_at:.2f} s"
+    assert found.sentence == f"SETTLES on the target after {found.settled_at:.1f} s"
     late = found.time > 0.5 * found.settled_at
     assert np.abs(found.error[late]).max() < 1e-3 * np.abs(found.error).max()
     assert found.settled_at == found.time[-1] < 60.0

@@ -158,6 +158,20 @@ def test_an_oscillation_is_followed_without_its_noise():
     assert np.sqrt(np.mean((course.at(time) - clean) ** 2)) < 2e3
 
 
+@pytest.mark.parametrize("noise", [1e-5, 1e-3])
+@pytest.mark.parametrize("between", [4, 6, 10, 40])
+def test_two_steps_of_the_normal_stress_one_way_are_no_ramp(between, noise):
+    """A short level between two steps was read as a ramp that lasted 300 s, or took negative time; a ramp is one."""
+    stress = np.repeat([1e7, 1.1e7, 1.2e7], [200, between, 200])
+    time, rng = np.arange(len(stress), dtype=float), np.random.default_rng(between)
+    course = stress_course(time, stress * (1 + noise * rng.standard_normal(len(time))))
+    assert [(one.time, one.duration) for one in course.changes] == [(199.5, 0.0), (199.5 + between, 0.0)]
+    ramp = np.interp(time, [199.0, 200.0 + between], [1e7, 1.2e7])
+    (one,) = stress_course(time, ramp * (1 + noise * rng.standard_normal(len(time)))).changes
+    assert one.time == pytest.approx(199.0, abs=2.0)
+    assert one.duration == pytest.approx(between + 1.0, abs=3.0)
+
+
 @pytest.mark.parametrize("at", [30.0, 41.0337, 60.0071])
 def test_a_change_among_very_many_samples_is_found_to_the_sample(monkeypatch, at):
     """Runs are looked for on means of samples; where they part is known better."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,6 +17,7 @@ LEAST_STRESS = 2e-3  # relative change of normal stress that counts as a change;
 OFF_LEVEL = 6.0  # standard deviations from a level beyond which a sample is not on it
 SUDDEN = 0.7  # share of a change that must happen between the few samples on both sides; chosen by trial,
 NEAR = 3  # samples on each side
+CLIMB = 0.2  # share of a rise: the halves of a ramp are .4 to .5 apart, those of a level between two steps 0
 BINS = 40  # number of means of a span that are tested for being constant; chosen by trial
 UNEVEN = 3.0  # ratio of their variance to that of noise from which the span is not constant; chosen by trial
 EARLIEST_STEP = 1e-6  # share of a sampling interval: earliest time of a step after the sample before it
@@ -54,7 +56,8 @@ def stress_course(time: Array, normal: Array) -> Course:
         changes = tuple(
             _change(time, normal, last - 1, first, levels[k : k + 2], noise) for k, (last, first) in enumerate(places)
         )
-        places = [_whole_ramp(time, pair, change) for pair, change in zip(places, changes, strict=True)]
+        ramps = [_whole_ramp(time, pair, change) for pair, change in zip(places, changes, strict=True)]
+        places = ramps if all(one[1] < other[0] for one, other in pairwise(ramps)) else places
     curves = []
     for span, level in zip(spans, levels, strict=True):
         if _is_not_constant(normal[span], noise):
@@ -87,6 +90,9 @@ def _transitions(time: Array, normal: Array, ranges: list[tuple[int, int]]) -> l
         last = first + 1
         while last < len(ranges) - 1 and _is_passing(levels, lengths, first, last):
             last += 1
+        between = slice(ranges[first + 1][0], ranges[last][0])
+        if last > first + 1 and not _climbs(normal[between], levels[last] - levels[first]):
+            last = first + 1  # a short level between two steps, not a ramp
         apart = abs(levels[first] - levels[last])
         if apart > LEAST_STRESS * max(abs(levels[first]), abs(levels[last])) and apart > OFF_LEVEL * noise:
             pair = _between(normal, ranges[first], ranges[last], levels[first], levels[last], noise)
@@ -105,6 +111,12 @@ def _is_passing(levels: Array, lengths: Array, first: int, middle: int) -> bool:
     low, high = sorted((levels[first], levels[middle + 1]))
     between = low < levels[middle] < high
     return bool(between and lengths[middle] < 0.2 * max(lengths[first], lengths[middle + 1]))
+
+
+def _climbs(values: Array, rise: float) -> bool:
+    """True if the means of the two halves of values are more than `CLIMB` of a rise apart."""
+    half = len(values) // 2
+    return bool((np.mean(values[-half:]) - np.mean(values[:half])) / rise > CLIMB)
 
 
 def _between(

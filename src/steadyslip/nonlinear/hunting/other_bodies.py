@@ -44,10 +44,10 @@ def measured_body(rig: Rig) -> str:
     return rig.drive.watched()[0] if reported_body(rig) else ""
 
 
-def other_bodies(rig: Slider | Machine) -> dict[str, float]:
+def other_bodies(rig: Rig) -> dict[str, float]:
     """Bodies with contacts, with their motion per motion of the drive; without a reported body that is measured."""
     own = reported_body(rig)
-    if not own or not isinstance(rig, Machine):
+    if not own:
         return {}
     speeds, measured = rig.ratios(), measured_body(rig)
     held = dict.fromkeys(surface.held for surface in rig.contacts.values())

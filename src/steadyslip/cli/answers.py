@@ -61,9 +61,9 @@ def print_formula(result: Any, along: str | None) -> None:
 def output_result(
     result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], bool | None]
 ) -> None:
-    """Print a result as text or JSON, then write it to files, so that a file that cannot be written loses nothing.
+    """Print a result as text or JSON, then write it to files: if a file cannot be written, the result is printed.
 
-    Exits with status 130 if the result was interrupted by Ctrl-C, or `write`, which then returns True.
+    Exits with status 130 if Ctrl-C interrupted the computation of the result, or its writing (`write` returns True).
     """
     if as_json:
         print_json(result.to_dict())

@@ -17,7 +17,7 @@ from steadyslip.linear.status import STABLE, UNSTABLE
 
 SAFETY_LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 """Contour levels of the safety factor k/k_cr."""
-_FALL = 1.7  # ratio of a field two points away to one point away above which it may be zero here; straight lines: 2
+_FALL = 1.7  # |field two points away| / |field one point away| above which it may be 0 here: 2 for a linear field
 _ROUNDING = 1e-6  # |share - 0.5| within which status depends on rounding: 1e10 times that of a double
 _ROOM = 24.0  # least distance in pixels between a contour's label and another line (by trial)
 # Median distance to an edge or another contour, over the width of a figure, below which a piece of a contour is left

@@ -39,7 +39,8 @@ _SPARE = 0.1  # share of the undelayed term's excess over the others that is add
 _TIMES_CUT, _PIECES = 3, 4  # number of times that an interval of θ without bound is cut, and pieces of each cut
 _ON_AXIS = 1e-3  # relative imaginary part up to which a root of a polynomial counts as real; a double one has 1e-8
 _MANY = 20_000  # periods during the longest delay, at the rig's own value, above which the search is refused
-_ROUNDING, _CORNER = 1e-12, 1e-8  # relative rounding error of edges θ; the second at infinite s, found by products
+_ROUNDING = 1e-12  # relative rounding error of edges θ
+_CORNER = 1e-8  # relative rounding error of edges θ at which a root comes from infinity
 _TOUCHED = 1e-7  # relative width up to which a window is rounding error of a root that touches the axis: ~sqrt(eps)
 _PLAIN = 1e-6  # |Re ds/dθ| over |ds/dθ| below which a root may move along the axis, so that roots are counted anew
 

@@ -49,7 +49,8 @@ def damping_measures(s: ComplexArray) -> Array:
 def is_hurwitz(c: Array, spare: ArrayLike) -> NDArray[np.bool_]:
     """True where all roots have negative real parts (Routh) and the equations are well posed, (...).
 
-    Equations are ill-posed if the highest coefficient is negative, or more than `spare` (...) of the highest are 0.
+    `c` (..., n + 1) has the lowest power first. Equations are ill-posed if the highest nonzero coefficient is negative,
+    or if more coefficients of the highest powers are 0 than `spare` (...) allows.
     """
     n = c.shape[-1] - 1
     flat = c.reshape(-1, n + 1)

@@ -49,7 +49,7 @@ def size_of_terms(c: Array, h: Array, s: Any) -> Any:
 
 
 def _terms(c: Array, h: Array) -> Iterator[tuple[Array, Array]]:
-    """Polynomial and delay of each term, of one rig or of rigs beside values (rows, k)."""
+    """Yield the coefficients and the delay of each term; for several rigs shaped to broadcast with values (rigs, k)."""
     for j in range(c.shape[-2]):
         yield (c[j], h[j]) if c.ndim == 2 else (c[:, j, None], h[:, j, None])
 

@@ -23,7 +23,7 @@ _LEAST_WITHOUT_MASS = 1
 
 
 def order_for(point: OperatingPoint) -> int:
-    """Number of variables of each late signal, large enough for all rigs of a point."""
+    """Order of the Padé approximation of delayed signals, high enough for every rig in the arrays of `point`."""
     with np.errstate(all="ignore"):
         found = [np.asarray(one, dtype=float) for one in point.evaluate(_frequencies(point.model))]
     squares, delays = found[: -len(point.model.delays)], found[-len(point.model.delays) :]

@@ -17,7 +17,7 @@ from steadyslip.nonlinear.hunting.hunt import hunt
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.reports.elements import heading, paragraph, table
 
-BAND = 2.0  # dead band tried, over the hunting amplitude; a band little wider than the cycle only slows it down
+BAND = 2.0  # dead band tried, as a multiple of the hunting amplitude; one slightly wider than the cycle only slows it
 STIFFER = 2.0  # factor tried on all gains
 LONGER = 4.0  # length of runs with changes over that of the run without: bounds computing time
 WHY = "it hunts because the integral winds up while friction at rest, larger than in sliding, holds the axis"

@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from steadyslip.machine.slider import Slider
     from steadyslip.verdict.findings import Findings
 
-# Relative distance within which a rig on an edge counts as on this edge. Wider than rounding, since rounding of the
-# growth rate moves edges in parameters of weak effect; chosen by trial: much wider, two edges could not be told apart.
+# Relative distance of a parameter from an edge of stability within which the rig counts as lying on the edge. It is
+# larger than rounding, because rounding of the growth rate moves edges in parameters of weak effect by more. By trial:
+# with a much larger value two neighbouring edges would count as one.
 NEXT_TO_IT = 1e-6
 
 ON_EDGE = "neither verdict should be relied on: the least change of a number decides; give it a damping if it has none"

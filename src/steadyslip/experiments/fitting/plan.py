@@ -160,7 +160,7 @@ class Plan:
     def _unknown(self, name: str, record: int | None) -> Unknown:
         if name.startswith("protocol."):
             if self.protocol is None:
-                raise InternalError(f"the plan has the free time {name} but no protocol")
+                raise InternalError(f"the time {name} is fitted, but the plan has no protocol with it")
             address = parameters(self.protocol, "protocol.")[name]
             return unknown(address, record, scale=0.01 * float(np.ptp(self.records[record or 0].time)))
         return unknown(self.rig.parameters()[name], record)

@@ -115,7 +115,10 @@ class SteadyCurve:
         return np.array(low), np.array(high)
 
     def starts(self, speed: Array, load: Array, force: Array, relative: bool) -> list[Array]:
-        """Best of a grid of scales and exponents, with all else from linear least squares within bounds."""
+        """Starting points of the search, best first, each (free,), from a grid of velocity scales and exponents.
+
+        The other parameters follow by linear least squares within bounds; `relative` weighs residuals by 1/`force`.
+        """
         from scipy.optimize import lsq_linear
 
         low, high = self.bounds(speed, load, force)

@@ -24,7 +24,10 @@ LONGEST_END = 0.05  # longest end, as share of the samples of a record; chosen b
 
 
 class Line(Protocol):
-    """Straight run: rate (m/s), levels at the first time of the record (m), index of the first sample."""
+    """Straight run of samples: rate (m/s), index of the first sample, and displacements (m) at the record's first time.
+
+    There is one of these, and one more for each slip of the sensor within the run.
+    """
 
     rate: float
     levels: Array

@@ -51,7 +51,7 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     if not _piecewise_linear(runs, time):
         return smooth_load(time, displacement)
     lines = _Lines(time, displacement, runs)
-    if max(lines.inflation) > LASTING:  # noise that looks like slips and glitches of the sensor
+    if max(lines.inflation) > LASTING:  # correlated noise, which looks like slips and glitches of the sensor
         others = straight_runs(time, displacement, lines.lasting)
         same = [one.members for one in others] == [one.members for one in lines.runs]
         if not same and _piecewise_linear(others, time):
@@ -370,7 +370,7 @@ class _ChangeFit:
 
     @cached_property
     def _costs_of_lines(self) -> list[Array]:
-        """Chi squared of the samples before each, (n + 1,), on the line before and on that after."""
+        """For both lines beside the change: chi squared of the first 0 to n samples about the line, (n + 1,)."""
         return [np.append(0.0, np.cumsum(self._costs(self.displacement - line))) for line in self._lines]
 
     def _costs(self, deviations: Array) -> Array:

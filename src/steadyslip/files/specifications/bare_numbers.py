@@ -117,7 +117,10 @@ def _speeds(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _doubts(rig: Rig, questioned: Collection[str]) -> Iterator[str]:
-    """Warnings of friction laws on their values, once for contacts with equal ones; without values `questioned`."""
+    """Warnings of friction laws about their values, once for contacts with equal warnings.
+
+    Contacts of which a value is in `questioned`, so that a warning on it was given already, are skipped.
+    """
     found: dict[str, list[str]] = {}
     for one in rig.laws_by_contact().values():
         if any(name.startswith(f"{one.prefix}friction.mu_") for name in questioned):

@@ -145,7 +145,7 @@ class Map(Displayed):
             problems += error.problems
 
     def _extremes(self, name: str) -> list[dict[str, Any]]:
-        """Smallest and largest value of a sampled parameter, each as a dict with its name."""
+        """Two dicts {`name`: value}, of the smallest and the largest value of a sampled parameter."""
         if isinstance(self.sampling, Generated):
             return [{n: end} for n, low, high, _ in self.sampling.ranges for end in (low, high) if n == name]
         if self.sampling is None:

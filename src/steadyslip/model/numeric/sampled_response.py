@@ -38,7 +38,7 @@ class ReceptanceSamples:
 
 
 def polynomial_shares(places: Any, known: Array) -> Any:
-    """Weights (k, p) of values at known places (k, p) in their polynomials at places (p,)."""
+    """Lagrange weights (k, p): a polynomial at `places` (p,) is the sum of its values at `known` (k, p) times these."""
     found = np.ones(known.shape, dtype=np.result_type(places, known))
     for i, one in enumerate(known):
         for j, other in enumerate(known):
@@ -48,7 +48,7 @@ def polynomial_shares(places: Any, known: Array) -> Any:
 
 
 def product(a: Any, b: Any) -> ComplexArray:
-    """Products (n, m, p) of many small matrices (n, k, p) and (k, m, p): a sum over k of long rows."""
+    """Products (n, m, p) of p small matrices (n, k, p) and (k, m, p): a loop over k, vectorised over p."""
     return np.asarray(sum(a[:, i, None] * b[i] for i in range(len(b))))
 
 

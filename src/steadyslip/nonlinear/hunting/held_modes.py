@@ -82,7 +82,7 @@ class HeldPiece:
 
     @cached_property
     def banded(self) -> Array:
-        """Row of the error that is integrated, reduced by the dead band."""
+        """Row vector that gives the integrated error from the state: the error less the dead band, zero within it."""
         band = self.plant.limits.dead_band
         if band is None:
             return self.plant.error()

@@ -22,7 +22,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.nonlinear.kicks.field import slopes_at, solved_at
 from steadyslip.nonlinear.kicks.rest import Rest
 
-STEP = 6e-3  # step of differences, natural sizes: its fourth power, the truncation error, is near that of rounding
+STEP = 6e-3  # step of finite differences, in natural sizes: truncation error STEP**4 is about the rounding error
 PLACES = np.array([-2.0, -1.0, 1.0, 2.0])  # points of differences, in steps; weights for both derivatives follow
 FIRST = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 SECOND = np.array([-1.0, 16.0, 16.0, -1.0]) / 12.0

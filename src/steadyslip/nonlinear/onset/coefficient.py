@@ -85,7 +85,10 @@ def _at_contacts(model: Model) -> ArrayFunction:
 
 
 def _projected(expansion: Taylor, omega: Array, speeds: Array, areas: Array) -> Cubic:
-    """First Lyapunov coefficients from Taylor terms, steady slip rates and areas of the contacts (m, contacts)."""
+    """First Lyapunov coefficients (m,) of oscillations with angular frequencies `omega` (m,), rad/s.
+
+    `speeds` are the steady slip rates (m/s) and `areas` the areas (m²) of the contacts, each (m, contacts).
+    """
     n = len(expansion.mass)
     gradient, unsure = (np.broadcast_to(e, (len(omega), n, n)) for e in (expansion.gradient, expansion.gradient_error))
     mass = np.diag(expansion.mass)

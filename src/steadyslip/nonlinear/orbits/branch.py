@@ -119,11 +119,11 @@ class CycleBranch(Displayed):
     def at(self, value: float) -> CyclesAt:
         """The cycles that exist at one value of the parameter, corrected to full precision.
 
-        Cycles of the branch come first, then those of twice the period and so on. If none of them attracts, motions are
-        simulated at the value; a stable cycle that one of them reaches is the last, and ``simulated`` of the result
-        describes each motion: cycles of several slip events may lie on branches of their own, in windows among
-        irregular motion. ``between`` are the bifurcations, or ends of a branch, that bound the window around the value,
-        ``multiples`` mark cycles of twice the period, and ``missed`` describes cycles that could not be computed.
+        The result has the cycles of the branch first, then those of twice its period, and so on. If none of them is
+        stable, motions are simulated at the value, because other branches may have stable cycles (of several slip
+        events, in windows of irregular motion). A stable cycle that a simulation reaches is appended; ``simulated``
+        describes each simulation. ``between`` are the bifurcations or ends of the branch on both sides of the value,
+        ``multiples`` the periods in multiples of the branch's, and ``missed`` the cycles that could not be computed.
         """
         found, multiples, missed = list[Cycle](), list[int](), list[str]()
         branch: CycleBranch | None = self

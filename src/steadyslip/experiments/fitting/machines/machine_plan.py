@@ -148,7 +148,10 @@ class MachinePlan:
         }
 
     def begins(self, space: Space, steadily: bool = False) -> Array:
-        """Coordinates (p,) of the machine's own values; a motion begins as its columns do, or steadily."""
+        """Search coordinates (p,) of the machine's parameter values.
+
+        Unknown initial states are those of the record's first sample or, with `steadily`, of steady sliding.
+        """
         known, values = self.known(), []
         for one in space.unknowns:
             kind, _, name = one.parameter.partition(".")

@@ -315,7 +315,7 @@ class Expressions:
         return arrays.new_array(self.lines, sizes, self.arrays_made[-1])
 
     def _function(self, node: ast.expr, name: str, given: Sequence[ast.expr]) -> Operand:
-        """Result of a call of another driver function; numbers are converted to its annotated types."""
+        """Result of a call of another compiled function; arguments are converted to the types that it annotates."""
         heads = self.others.functions[name][0].args.args
         if len(heads) != len(given):
             raise self.refuse(node, f"a call of {name} with {len(given)} arguments")

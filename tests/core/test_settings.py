@@ -132,7 +132,7 @@ FAULTS = {
     "map": {
         "compute = 3": "allowed: a list of names",
         "chunk = 0": "allowed: a whole number from 1",
-        "over.angle = { from = 1, to = 2 }": "missing (how many)",
+        "over.angle = { from = 1, to = 2 }": "missing (number of values)",
         "over.angle = { from = 1, to = 2, points = 2, spacing = 'logg' }": "did you mean 'log'?",
         "over.angle = { from = true, to = 2, points = 2 }": "text with a unit",
         "over.angle = 3": "a list of values",

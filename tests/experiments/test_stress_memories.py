@@ -332,3 +332,15 @@ def test_values_of_a_wrong_evolution_law_are_not_given_with_small_errors(memory,
              if name in {one.name.removeprefix("friction.") for one in (*fit.estimates, *fit.derived)}
              and abs(fit[name].value - value) > 4 * fit[name].error]  # fmt: skip
     assert "do not use the values above" in said or not wrong, said
+
+
+@pytest.mark.campaign
+def test_a_minimum_in_which_a_less_b_has_the_other_sign_leaves_open_what_it_moves():
+    """Steps of the normal stress alone: a of .0154, b of .0011 fit as well as .012 and .0245; b was 58 errors off."""
+    drawn = list(fits_at_random.drawn("pressed", 25, 90210))[-1]
+    fit = ss.fit(ss.lab_rig(drawn.law, normal_memory="linker-dieterich"), drawn.record)
+    truth = drawn.rig.friction
+    assert (fit.values["friction.a"] - fit.values["friction.b"]) * (truth.a - truth.b) < 0
+    open_ones = {one.name for one in fit.estimates if not one.determined}
+    assert open_ones >= {"friction.a", "friction.b", "friction.normal_memory.alpha"}
+    assert "a - b" not in str(fit)

@@ -179,7 +179,7 @@ def test_the_phase_plane_is_that_of_the_contact_that_moves_most_or_of_the_one_th
     assert not still.texts  # no arrow where nothing moves
     with pytest.raises(ss.ParameterError, match="unknown contact 'drie'; did you mean 'dry'"):
         run.plot("phase", contact="drie")
-    with pytest.raises(ss.ParameterError, match="contact: got 'dry'; a history shows all"):
+    with pytest.raises(ss.ParameterError, match="contact: got 'dry'; allowed only with kind='phase'"):
         run.plot(contact="dry")
 
 

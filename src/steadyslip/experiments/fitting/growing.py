@@ -57,6 +57,12 @@ def several_changes(plan: Plan) -> bool:
     )  # fmt: skip
 
 
+def stress_alone(plan: Plan) -> bool:
+    """True if the normal stress changes in a record and drives the contact, and the rate of no record changes."""
+    steady = all(channel != "load" for loading in plan.loading for channel, *_ in loading.changes)
+    return steady and plan.pressed and any(record.stress_changes for record in plan.records)
+
+
 def _beginnings(plan: Plan) -> Iterator[Plan]:
     """Plans of the records up to their second change, their third and so on."""
     often = max(len(loading.changes) for loading in plan.loading)

@@ -16,10 +16,11 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.estimates import LEAST_CHANGE, Combination, combination, is_time
+from steadyslip.experiments.fitting.growing import stress_alone
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, remedy, with_words
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, WEAKENING, Remedy, remedy, weakening, with_words
 from steadyslip.experiments.fitting.search import ROUGH_PATIENCE
-from steadyslip.experiments.fitting.starts import features_of, search_bounds
+from steadyslip.experiments.fitting.starts import features_of, of_other_sign, search_bounds
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.numerics.least_squares import LOST, Minima, minimise
 
@@ -63,12 +64,6 @@ def forgets_changes(plan: Plan) -> bool:
     return changes and plan.pressed and bool(plan.rig.friction.forgets_stress())
 
 
-def stress_alone(plan: Plan) -> bool:
-    """True if the normal stress changes in a record and drives the contact, and the rate of no record changes."""
-    steady = all(channel != "load" for loading in plan.loading for channel, *_ in loading.changes)
-    return steady and plan.pressed and any(record.stress_changes for record in plan.records)
-
-
 def equal_memories(
     plan: Plan, ssq: float, values: Mapping[str, float], deviations: Array, independent: float
 ) -> list[Rival]:
@@ -101,6 +96,27 @@ def equal_memories(
         near = [one for own in new for one in _rivals(plan, own, ssq, values, most)]
         found += [one for one in near if np.any(one.far(space, deviations, NEAR))]
     return sorted(found, key=lambda one: -one.remedy.gain)
+
+
+def other_sign(plan: Plan, ssq: float, coordinates: Array, independent: float) -> list[Rival]:
+    """Minimum in which a - b has the other sign and which fits as well, where only the normal stress changes."""
+    space, most = plan.space(), ssq * float(np.exp(AS_GOOD / independent))
+    begin = of_other_sign(space, coordinates[None]) if stress_alone(plan) else coordinates[None][:0]
+    if not len(begin):
+        return []
+    budget = Budget.of_fit(sum(map(len, plan.records)), len(space))
+    comparison = plan.for_trial().comparison(Effort(patience=ROUGH_PATIENCE, budget=budget))
+    low, high = search_bounds(comparison.parts, features_of(comparison.parts), space)
+    ends = minimise(
+        lambda x, _: comparison.residuals(x), np.clip(begin, low, high), low, high, stop=budget.part(np.inf), known=most
+    )
+    found = [remedy(plan, plan, comparison, z, ssq, len(space)) for z in ends.coordinates[ends.ssq < most]]
+    own = weakening(plan.rig, dict(zip((u.name for u in space.unknowns), space.values(coordinates), strict=True)))
+    return [
+        Rival(one, space, z - coordinates)
+        for one, z in zip(found, ends.coordinates, strict=False)
+        if own is not None and one.values[WEAKENING] * own < 0
+    ]
 
 
 def _with_memory(plan: Plan, form: Sequence[str]) -> Iterator[Plan]:

@@ -15,7 +15,8 @@ from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.derived import DERIVED, Minimum, derived_estimates, derived_values, joint_errors
 from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fitted import Fitted
-from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes, opened, stress_alone
+from steadyslip.experiments.fitting.growing import stress_alone
+from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes, opened, other_sign
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.refit import RampFit, driven_as_measured, with_ramps
 from steadyslip.experiments.fitting.remedies import (
@@ -148,7 +149,8 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         if not ((forgets or stress_alone(self.plan)) and self.search.converged) or self.whiteness.p < STRUCTURE:
             return self
         rivals = self._equal_memories()
-        if not (rivals or forgets):
+        turned = other_sign(self.plan, self.ssq, self.coordinates, self._independent)
+        if not (rivals or forgets or turned):
             return self
         other = forgets and mended(self.plan, self.ssq, self.values)
         better = remedies(self.plan, self.ssq, self.values, 1) if other else ()
@@ -157,7 +159,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
             same.__dict__["remedies"] = better
             return same
         equal = [one for one in rivals if one.remedy.gain < STRONG_EVIDENCE]
-        equal = equal if len(equal) == len(rivals) else []
+        equal = (equal if len(equal) == len(rivals) else []) + turned
         covariance, found = opened(self.space, self.covariance, equal)
         near = self.coordinates + np.array([one.shift(self.space) for one in equal]).reshape(-1, len(self.space))
         same = replace(self, covariance=covariance, unidentified=self.unidentified + found,
@@ -184,9 +186,13 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return self
 
     def _equal_memories(self) -> list[Rival]:
+        return equal_memories(self.plan, self.ssq, self.values, self._minimum.deviations, self._independent)
+
+    @property
+    def _independent(self) -> float:
+        """Number of independent samples in the residuals."""
         parts = zip(self.comparison.slices, self.noise, strict=True)
-        independent = sum((where.stop - where.start) / max(noise.inflation, 1.0) for where, noise in parts)
-        return equal_memories(self.plan, self.ssq, self.values, self._minimum.deviations, independent)
+        return float(sum((where.stop - where.start) / max(noise.inflation, 1.0) for where, noise in parts))
 
     @property
     def _minimum(self) -> Minimum:

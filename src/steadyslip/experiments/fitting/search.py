@@ -17,10 +17,10 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.condensed import Condensed, condensed_along
 from steadyslip.experiments.fitting.effort import Effort, work_of_search
-from steadyslip.experiments.fitting.growing import grown, several_changes
+from steadyslip.experiments.fitting.growing import grown, several_changes, stress_alone
 from steadyslip.experiments.fitting.nested import NestedModel, nested_models
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.starts import features_of, search_bounds, starting_points
+from steadyslip.experiments.fitting.starts import features_of, of_other_sign, search_bounds, starting_points
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.measured.record import transient_rows
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, HOPE, SAME_SSQ, Minima, minimise
@@ -165,6 +165,8 @@ def find_minimum(
     found = first_computable(search.whole, search.nested(found, {} if known is None else known))
     if not np.isfinite(found.ssq[0]):
         raise NotAvailable(f"the model cannot follow these records; {_suspects(plan)}")
+    if stress_alone(plan):
+        found = first_computable(search.whole, search.with_other_sign(found))
     best, ssq = with_states_sorted(search.whole, found)
     return SearchResult(best, ssq, search.whole, search.summary(found), (search.low, search.high))
 
@@ -325,6 +327,15 @@ class _Search:
             better = other.ssq < found.ssq[0] * (1 - MIN_GAIN)
             found = (found + (self._minimise_on_all(begin) if better else self._refine_from(begin))).sorted()
         return found
+
+    def with_other_sign(self, found: Minima) -> Minima:
+        """Add the minimum reached from where a - b has the other sign; the best first.
+
+        Steps of the normal stress alone are followed nearly as well by laws that strengthen as by laws that weaken with
+        velocity, with other memories of normal stress, and starts may all lead to one of them.
+        """
+        begin = of_other_sign(self.whole.space, found.coordinates[:1])
+        return (found + self._refine_from(np.clip(begin, self.low, self.high))).sorted() if len(begin) else found
 
     def _can_compete(self, model: NestedModel) -> bool:
         """True if a nested model, on few samples and from few starts, comes near the best sum of squares."""

@@ -36,6 +36,8 @@ MAX_STIFFNESS_RATIO = (
 FASTER = 100.0  # largest starting value of a velocity scale, in the fastest rates of the drive: events are faster
 FURTHER = 2  # velocity scales that start independently of each other: v_a and v_b
 _DIRECT = (0.004, 0.01, 0.025)  # starting values of a without a velocity step: the range usual for rocks
+_SIGN = ("direct effect", "evolution effect")  # kinds of a and b
+OTHER_SIDE = (0.5, 2.0)  # b/a from which a minimum is sought where a - b has the other sign: what laboratories find
 
 
 @dataclass(frozen=True)
@@ -299,3 +301,15 @@ def _protocol_time(name: str, part: RecordPart) -> float:
     if not isinstance(part.inputs, ProtocolInputs):
         raise InternalError(f"{name} is free, but the record is not driven by a protocol")
     return float(part.inputs.plain[name] or 0.0)
+
+
+def of_other_sign(space: Space, coordinates: Array) -> Array:
+    """Coordinates (1, p) with b on the other side of a; none (0, p) unless one a and one b are unknown."""
+    kinds = [one.kind for one in space.unknowns]
+    if any(kinds.count(kind) != 1 for kind in _SIGN):
+        return coordinates[:0]
+    a, b = map(kinds.index, _SIGN)
+    values, found = space.values(coordinates), coordinates.copy()
+    ratio = OTHER_SIDE[int(values[0, b] < values[0, a])]
+    found[0, b] = space.unknowns[b].coordinate(ratio * values[0, a])
+    return found

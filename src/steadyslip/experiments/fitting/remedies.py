@@ -327,7 +327,9 @@ def _evolving(plan: Plan) -> tuple[str, ...]:
 
 def _of_state(plan: Plan, one: Unknown, values: Mapping[str, float]) -> Array | float:
     """Starting values of an unknown of the first or second state, from those of the only state of another plan."""
-    known = _evolving(plan)[0] if one.kind == "evolution effect" else "friction.d_c"
+    if not (own := plan.rig.of_kind(one.kind)):
+        return 0.0
+    known = own[0]  # the law's own, before those of memories
     value = values.get(known, values.get(f"{known}@1", plan.rig.value(known) or 0.0))
     if ".states.2." not in one.parameter:
         return value

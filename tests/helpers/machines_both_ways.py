@@ -58,7 +58,7 @@ def differences(machine):
         found.append("eigenvalues")
     for margin in ss.margins(machine):
         name = margin.parameter
-        by_symbols = search_for(machine, name, machine.kept_zeros(), 0)  # which margins of large machines do not take
+        by_symbols = search_for(machine, name, machine.kept_zeros(name), 0)  # not taken by margins of large machines
         low, high = by_symbols.searched
         least = TINY * abs(margin.value)
         edges = [

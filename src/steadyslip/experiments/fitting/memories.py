@@ -110,13 +110,10 @@ def other_sign(plan: Plan, ssq: float, coordinates: Array, independent: float) -
     ends = minimise(
         lambda x, _: comparison.residuals(x), np.clip(begin, low, high), low, high, stop=budget.part(np.inf), known=most
     )
-    found = [remedy(plan, plan, comparison, z, ssq, len(space)) for z in ends.coordinates[ends.ssq < most]]
     own = weakening(plan.rig, dict(zip((u.name for u in space.unknowns), space.values(coordinates), strict=True)))
-    return [
-        Rival(one, space, z - coordinates)
-        for one, z in zip(found, ends.coordinates, strict=False)
-        if own is not None and one.values[WEAKENING] * own < 0
-    ]
+    equal = ends.coordinates[ends.ssq < most]
+    rivals = [Rival(remedy(plan, plan, comparison, z, ssq, len(space)), space, z - coordinates) for z in equal]
+    return [one for one in rivals if own is not None and one.remedy.values[WEAKENING] * own < 0]
 
 
 def _with_memory(plan: Plan, form: Sequence[str]) -> Iterator[Plan]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -139,11 +140,12 @@ def find_minimum(
     """
     search = _Search(plan, starts, effort, progress)
     third = -(-starts // 3)
-    rounds = [*dict.fromkeys((min(FIRST_STARTS, third), third, starts, 2 * starts, 3 * starts, 4 * starts))]
+    counts = [*dict.fromkeys((min(FIRST_STARTS, third), third, starts, 2 * starts, 3 * starts, 4 * starts))]
+    rounds: list[tuple[int, Callable[[], None]]] = [(upto, partial(search.try_starts, upto)) for upto in counts]
     if several_changes(plan):
-        rounds.insert(1, rounds[0])
-    for upto in rounds:
-        search.try_starts(upto)
+        rounds.insert(1, (counts[0], search.try_grown_starts))
+    for upto, try_more in rounds:
+        try_more()
         last = search.allowance.was_met
         if not search.any_followed:
             if last:
@@ -243,22 +245,28 @@ class _Search:
         return report
 
     def try_starts(self, upto: int) -> None:
-        """Minimise on few samples from further starting points, until `upto` have been tried; then from grown ones."""
+        """Minimise on few samples from further starting points, until `upto` have been tried."""
         already = len(self.rough.ssq) - self.grown
-        count = upto - already or FIRST_STARTS
-        begin = starting_points(self.whole.parts, self.features, self.whole.space, count, already % upto)
+        begin = starting_points(self.whole.parts, self.features, self.whole.space, upto - already, already)
+        model = self.rough_model
+        ends = minimise(lambda z, _: model.residuals(z), begin, self.low, self.high, **self._of_starts())
+        self.rough = self.rough + ends
+
+    def try_grown_starts(self) -> None:
+        """Minimise on few samples from the first starting points, which follow more and more of the records."""
+        begin = starting_points(self.whole.parts, self.features, self.whole.space, FIRST_STARTS, 0)
+        effort = replace(self.effort, patience=ROUGH_PATIENCE, growth=ROUGH_GROWTH)
+        ends = grown(self.rough_plan, begin, self.low, self.high, effort, self._of_starts())
+        self.grown = len(ends.ssq)
+        self.rough = self.rough + ends
+
+    def _of_starts(self) -> dict[str, Any]:
+        """Options of `minimise` for starts on few samples; their stage of work begins."""
         self.allowance = self.stages[0]
-        options: Any = {
+        return {
             "most": ROUGH_ITERATIONS, "tolerance": 1e-4, "race": MIN_ARRIVED, "stop": self.allowance,
             "callback": self.reporter("searching", self.rough_model),
         }  # fmt: skip
-        if upto == already:
-            effort = replace(self.effort, patience=ROUGH_PATIENCE, growth=ROUGH_GROWTH)
-            ends = grown(self.rough_plan, begin, self.low, self.high, effort, options)
-            self.grown += len(ends.ssq)
-        else:
-            ends = minimise(lambda z, _: self.rough_model.residuals(z), begin, self.low, self.high, **options)
-        self.rough = self.rough + ends
 
     def refine_finalists(self) -> None:
         """Refine the finalists on condensed samples (all, if none are condensed) and count the starts that agree."""

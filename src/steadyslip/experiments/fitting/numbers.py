@@ -168,15 +168,19 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return same
 
     def _without_weakening(self) -> Self:
-        """The same fit, without b and a - b where a second state of long slip distance fits as well as its trend."""
+        """The same fit, without b and a - b where a second state of long slip distance fits as well as its trend.
+
+        Where residuals have structure neither is right, and only a state that fits better by strong evidence counts.
+        """
         slow = slow_state(self.plan, self.ssq, self.plan, self.values)
-        if slow is None or slow.gain < -STRONG_EVIDENCE:
+        noise = self.whiteness.p >= STRUCTURE
+        if slow is None or slow.gain < (-STRONG_EVIDENCE if noise else STRONG_EVIDENCE):
             return self
         lost = np.array([one.kind == "evolution effect" for one in self.space.unknowns])
         covariance = np.where(lost | lost[:, None], 0.0, self.covariance)
         covariance[lost, lost] = np.inf
         same = replace(self, covariance=covariance, joint={})
-        if self.whiteness.p >= STRUCTURE:
+        if noise:
             same.__dict__["remedies"] = (slow,)
         return same
 

@@ -343,6 +343,8 @@ def test_a_law_of_an_installed_package_is_found_by_its_entry_point(tmp_path):
     assert without.returncode == 2
     assert "unknown friction law 'my-law'" in without.stderr
     assert "entry points 'steadyslip.laws'" in without.stderr
+    drive = problems(TEXT.replace("[drive]", '[drive]\ncontrol = "odd"'))["drive.control"][1]
+    assert drive == "unknown control 'odd'; allowed: steady, pd, pid"
     (tmp_path / "my_laws.py").write_text("import nonsense_that_is_not_there")
     broken = subprocess.run(command, capture_output=True, encoding="utf-8", env=on_path)
     assert broken.returncode == 2

@@ -110,7 +110,7 @@ def find_law(family: type[FrozenRecord], name: object) -> type[FrozenRecord]:
     key, _ = selector(family)
     what = family.family if key in _OF_FAMILIES else key
     message = unknown_name(what, name, family.registry)
-    if isinstance(name, str) and not get_close_matches(name, family.registry, cutoff=0.75):
+    if key == "law" and isinstance(name, str) and not get_close_matches(name, family.registry, cutoff=0.75):
         message += f"; to add your own: import it in Python, or list it in a package's entry points {ENTRY_POINTS!r}"
     raise ParameterError([Problem("", message)])
 

@@ -47,7 +47,7 @@ def test_hostile_records_are_a_sentence(tmp_path, name):
 @pytest.mark.parametrize(
     ("name", "why"),
     [("compound-arrays.h5", "100000000 numbers; allowed: up to"), ("cell-of-itself.mat", "more members"),
-     ("bomb.xlsx", "unpacks to .* which no table")],
+     ("bomb.xlsx", "unpacks to .* too much for a table")],
 )  # fmt: skip
 def test_what_a_file_states_is_not_believed(tmp_path, name, why):
     """Each takes gigabytes, or never ends, when its library is let have its way."""

@@ -192,7 +192,7 @@ def test_coefficients_in_per_cent_and_loads_named_m_are_read(tmp_path):
 
 def test_a_table_without_a_header_is_told_what_to_write(tmp_path):
     (file := tmp_path / "t.csv").write_text("0.1,610\n0.5,600\n2,548\n5,487\n")
-    with pytest.raises(ss.ParameterError, match=r"the file has no header, .* such as: speed \[mm/min\], force \[N\]"):
+    with pytest.raises(ss.ParameterError, match=r"no header to name its .* such as: speed \[mm/min\], force \[N\]"):
         read_speed_table(file)
 
 
@@ -241,7 +241,7 @@ QUESTIONS = {
     "a direction without load": (
         "speed [rpm],torque [Nm],load [Nm]\n10,2.4,10\n30,2.1,10\n90,1.7,10\n300,1.4,10\n900,1.2,10\n"
         "-10,1.5,0\n-30,1.25,0\n-90,1,0\n-300,0.75,0\n-900,0.62,0\n",
-        "backward: 5 rows left out, as load 0 N m throughout tells no coefficient: give the loads, or these rows as",
+        "backward: 5 rows left out, as no coefficient follows from a load of 0 N m throughout: give the loads, or",
     ),
     "speeds in another unit": ("v [m/s],F [N]\n1,800\n30,500\n600,400\n", r"up to 600 m/s\? They are in m/s in the"),
     "a weight": (

@@ -162,7 +162,7 @@ def test_a_clock_that_begins_anew_is_refused(tmp_path):
     """Half of the rows were left out, and the next that counted was a jump of everything."""
     time, friction, normal, moved = columns()
     text = HEAD + rows(",", plain(np.where(time > 15, time - 15, time)), plain(moved), plain(friction), plain(normal))
-    with pytest.raises(ss.ParameterError, match=r"line 32: the clock begins anew, 0\.25.* s after 14\.7.* for 29 rows"):
+    with pytest.raises(ss.ParameterError, match=r"line 32: .* starts again, at 0\.25.* s after 14\.7.* for 29 rows"):
         read_as(tmp_path, text)
 
 

@@ -65,7 +65,7 @@ def test_a_damaged_xlook_file_is_refused(tmp_path):
     whole = xlook("f4")
     for damaged in (whole[:-3], whole[: len(whole) // 2], whole + b"\0"):
         (tmp_path / "p1").write_bytes(damaged)
-        with pytest.raises(ss.NotAvailable, match=r"damaged XLOOK file.*copy it anew"):
+        with pytest.raises(ss.NotAvailable, match=r"damaged XLOOK file.*copy it again"):
             ss.read_record(tmp_path / "p1")
 
 

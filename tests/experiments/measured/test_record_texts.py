@@ -133,7 +133,7 @@ def test_what_stands_for_no_number(tmp_path, cell, column):
     np.testing.assert_allclose(record.friction, np.delete(columns()[1], np.array(places) - 1), atol=1e-5)
     assert any("3 rows without a number" in note for note in record.notes)
     if cell[-1:].isdigit():
-        assert any("stands for no number" in note for note in record.notes)
+        assert any("marks a missing value" in note for note in record.notes)
 
 
 def test_a_record_that_passes_such_a_number_keeps_it():

@@ -1,4 +1,4 @@
-"""Cleaning of columns in SI units to a Record: complete rows in order of time; every change is noted."""
+"""Conversion of columns in SI units to a Record of complete rows in order of time, with a note of every change."""
 
 from __future__ import annotations
 
@@ -9,39 +9,39 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_count, format_quantity
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen
 
-GAP = 10.0  # ratio to the usual spacing from which an interval is noted as a gap; chosen by trial
+GAP = 10.0  # an interval is noted as a gap from this multiple of the usual spacing; chosen by trial
 RESTART = 0.02  # the clock restarted if more than this share of consecutive rows has times before the latest; by trial
-COARSE, EVEN = 0.6, 1.25  # share of distinct times below which a clock may be coarse; deviation of even rows, in ticks
-AROUND = 25  # rows on each side whose mean spacing is the usual one; chosen by trial
+COARSE, EVEN = 0.6, 1.25
+"""Share of distinct times below which a clock may be coarse; largest range of times about even ones, in clock ticks."""
+AROUND = 25  # the usual spacing is the mean over this many rows on each side; chosen by trial
 LARGEST_NUMBER = 1e60  # largest SI number allowed: squares and ratios then stay within floating point
-ASSUMED = "(assumed; give area)"  # in the note on a force without an area, so that its stress says nothing
-PLAUSIBLE = (1e-3, 10.0)  # range of friction coefficients: outside, a unit is wrong
+ASSUMED = "(assumed; give area)"  # in the note on a force without an area: its stress is then meaningless
+PLAUSIBLE = (1e-3, 10.0)  # range of friction coefficients: outside it, a unit is wrong
 USUAL = {
-    "the load point moves at": ("m/s", (5e-9, 1e-3), "displacement and time in the units that are said here (um, s)"),
-    "the load point moves": ("m", (0.0, 0.1), "displacements in the unit that is said here (mm for um)"),
-    "samples come every": ("s", (5e-5, 10.0), "times in the unit that is said here (ms for s)"),
-    "the normal stress is": ("Pa", (2e5, 2e9), "stresses in the unit that is said here (kPa for MPa)"),
+    "the load point moves at": ("m/s", (5e-9, 1e-3), "displacement and time in the units stated (um, s)"),
+    "the load point moves": ("m", (0.0, 0.1), "displacements in the unit stated (um, not mm)"),
+    "samples come every": ("s", (5e-5, 10.0), "times in the unit stated (s, not ms)"),
+    "the normal stress is": ("Pa", (2e5, 2e9), "stresses in the unit stated (MPa, not kPa)"),
 }
-"""Units and ranges of means in laboratories, and what to look at beyond: a factor of 1000 leaves most of the ranges."""
+"""Unit, usual range and advice for the mean of each quantity in a laboratory: a factor of 1000 is mostly noticed."""
 PLACEHOLDERS = (999.0, 999.25, 9999.0, 9999.25, 99999.0, 999999.0, 1e20, 1e30, 9.9e37, 9.91e37, 9.969209968386869e36)
 """Placeholders, of either sign, that instruments and programs write for missing values."""
-PLACEHOLDER_RATIO = (
-    4.0  # ratio of a placeholder to the largest other number, unless it has another sign than all; chosen by trial
-)
+PLACEHOLDER_RATIO = 4.0
+"""Least ratio of a placeholder to the largest other number; not needed if its sign is unique; chosen by trial."""
 PLACEHOLDER_TOLERANCE = 1e-6  # relative difference from a placeholder: single precision, and rounding when printed
-MOST_PLACEHOLDERS = 0.2  # share of a column from which a number is no placeholder but measured; chosen by trial
+MOST_PLACEHOLDERS = 0.2  # a number that makes up a larger share of its column was measured; chosen by trial
 
 
 def without_placeholders(values: Array, name: str, notes: list[str]) -> Array:
     """Column with NaN in place of placeholders for missing values; adds a note for each.
 
-    A placeholder is rare and far from all other numbers of its column: a record that passes 999 keeps it.
+    A placeholder is rare and far from all other numbers of its column: measured values that pass 999 are kept.
     """
     found = values
     while (number := _placeholder(found)) is not None:
         same = np.abs(found - number) <= PLACEHOLDER_TOLERANCE * abs(number)
         found = np.where(same, np.nan, found)
-        notes.append(f"{int(np.sum(same))} times {number:.6g} in column {name!r} stands for no number")
+        notes.append(f"{number:.6g} marks a missing value {int(np.sum(same))} times in column {name!r}")
     return found
 
 
@@ -64,8 +64,8 @@ def _placeholder(values: Array) -> float | None:
 def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, any_sign: bool = False) -> Record:
     """Record from columns in SI units: complete rows in order of time, with a note of every change.
 
-    `any_sign` accepts columns that count compression as negative or displacement backwards, as files do, and turns
-    them.
+    If `any_sign` is true, the signs of columns that count compression or displacement as negative, as some files do,
+    are changed.
     """
     si, lines = rows_in_order(si, source, notes, lines)
     si = _in_compression(si, notes) if any_sign else si
@@ -95,7 +95,7 @@ def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, a
                 f"{format_quantity(most, 'm')}; kept as measured"
             )
         if "velocity" in si:
-            notes.append("the load point's displacement drives the model; its velocity column is only shown")
+            notes.append("the load point's displacement drives the model; its velocity column is only plotted")
     integrated = "displacement" not in si and "velocity" in si
     if integrated:
         steps = 0.5 * (si["velocity"][1:] + si["velocity"][:-1]) * spacing
@@ -117,7 +117,7 @@ def rows_in_order(si: dict[str, Array], source: str, notes: list[str], lines: Ar
     Raises
     ------
     ParameterError
-        If fewer than `FEWEST_ROWS` are left, or numbers or the clock are not those of an experiment.
+        If fewer than `FEWEST_ROWS` are left, numbers are impossibly large, or the clock stands still or restarts.
     """
     si, lines = _without_gaps_in_rows(si, lines, notes)
     _check_sizes(si, source, lines)
@@ -143,7 +143,7 @@ def _without_gaps_in_rows(si: dict[str, Array], lines: Array, notes: list[str]) 
 
 
 def _in_order(si: dict[str, Array], lines: Array, notes: list[str], source: str) -> tuple[dict[str, Array], Array]:
-    """Leave out rows whose time goes back, and separate rows of equal time (see `_separated_times`)."""
+    """Rows without those whose time goes back, and with rows of equal time separated (see `_separated_times`)."""
     time = si["time"]
     high = np.maximum.accumulate(time)
     back = time < high
@@ -159,13 +159,13 @@ def _in_order(si: dict[str, Array], lines: Array, notes: list[str], source: str)
 
 
 def _check_clock(time: Array, high: Array, back: Array, lines: Array, source: str) -> None:
-    """Raise an error for a clock that restarts: the rows after it would be left out, or look like a jump."""
+    """Raise an error for a clock that restarts: the rows after the restart would be lost, or look like a jump."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], back, [False]]).astype(int)))
     begin, end = ends.reshape(-1, 2)[int(np.argmax(ends[1::2] - ends[::2]))]
     if end - begin > max(RESTART * len(time), FEWEST_ROWS):
         message = (
-            f"line {lines[begin]}: the clock begins anew, {time[begin]:.6g} s after {high[begin]:.6g} s, for "
-            f"{end - begin} rows; give each part as a file of its own, or mend the time"
+            f"line {lines[begin]}: the clock starts again, at {time[begin]:.6g} s after {high[begin]:.6g} s, for "
+            f"{end - begin} rows; give each part as a separate file, or correct the times"
         )
         raise ParameterError([Problem("time", message)], title=source)
 
@@ -182,10 +182,10 @@ def _even_times(time: Array) -> Array | None:
 
 
 def _separated_times(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
-    """Separate rows of equal time, which come from a clock coarser than the sampling, or are duplicates.
+    """Rows with distinct times; rows of equal time come from a clock coarser than the sampling, or are duplicates.
 
-    A group that has as many rows as fit into the time to the next stamp at the usual spacing is spread evenly over it.
-    Any other group becomes one row, its mean, because another time for one of its rows would be invented.
+    A group of rows of equal time is spread evenly up to the next time, if it has as many rows as fit there at the usual
+    spacing. Any other group becomes one row, its mean, because different times for its rows would be invented.
     """
     time = si["time"]
     unique, first, counts = np.unique(time, return_index=True, return_counts=True)
@@ -210,7 +210,7 @@ def _separated_times(si: dict[str, Array], lines: Array, notes: list[str]) -> tu
     sizes = np.diff(starts, append=len(time))
     if np.any(spread):
         rows = int(np.sum(counts[spread]))
-        notes.append(f"{rows} rows share a time with others; spread evenly to the next, as the usual spacing has it")
+        notes.append(f"{rows} rows share a time with others; spread evenly up to the next time")
     if len(starts) < len(time):
         rows = len(time) - len(starts)
         said = "row repeats" if rows == 1 else "rows repeat"
@@ -291,7 +291,7 @@ def _check_stress(si: dict[str, Array], source: str, lines: Array) -> None:
 
 
 def _unusual(si: dict[str, Array], forces: bool) -> list[str]:
-    """Notes on columns whose means are unusual, as they are where a unit is wrong."""
+    """Notes on columns with an unusual mean, which often means that a unit is wrong."""
     time, travel = si["time"], float(np.ptp(si.get("displacement", 0.0)))
     normal = 0.0 if forces else float(np.mean(si.get("normal", 0.0)))
     means = (travel / float(np.ptp(time)), travel, float(np.median(np.diff(time))), normal)

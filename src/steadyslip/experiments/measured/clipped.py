@@ -1,4 +1,4 @@
-"""Samples of friction that are none: of a full channel (runs of its largest or smallest value), or wild ones."""
+"""Removal of faulty friction samples: cut off at a limit of the channel, far off their neighbours, or far off a fit."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from steadyslip.core.arrays import Array
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.splitting import level_noise, spread
 
-SHORTEST = 3  # samples of a run
-CHANCE = 1e-6  # of so long a run in a record whose samples are as often equal to their neighbour as the others of it
-GAP = 5  # samples between runs of one peak: noise brings the channel back below its limit for a moment
+SHORTEST = 3  # least number of equal samples in a row that count as cut off
+CHANCE = 1e-6  # probability of such a run by chance, from how often neighbouring samples of the record are equal
+GAP = 5  # runs closer than this many samples are one peak: noise brings the channel below its limit for a moment
 PLATEAU, QUIET = 10, 0.3
-"""Samples of a plateau, and its noise as a share of that of the record: of a random walk, or white noise about a peak,
-one in 1e7 stays so close to its largest value so long."""
-STILL = 1e-3  # share of the median change from sample to sample below which a channel stands still
+"""Least number of samples of a plateau, and its largest noise as a share of the record's noise. A random walk, or white
+noise about a peak, stays so close to its largest value for so long once in 1e7 cases."""
+STILL = 1e-3  # a channel stands still if it changes by less than this share of its median change between samples
 CLIPPED = "at a limit of the channel"
-BESIDE = 2  # samples on each side with which a sample is compared
+BESIDE = 2  # neighbours on each side with which a sample is compared
 WILD_SIZE, WILD_RANGE = 20.0, 4.0
-"""Least distance of a wild sample from the median of those beside it: in standard deviations of the noise, as
-`OUTLIER_SIZE`, and in ranges of those beside it, which a peak of friction raises too."""
-AFTER = 4  # samples after a change of the loading in which friction may have a peak of one sample
-LARGEST_DIRECT = 0.05  # of such a peak, per e-fold of rate: twice the largest direct effect of rocks
+"""Least distance of a wild sample from the median of its neighbours: in standard deviations of the noise (as
+`OUTLIER_SIZE`), and in ranges of the neighbours, which are wide at a true peak of friction."""
+AFTER = 4  # samples after a change of the loading in which friction may have a peak of a single sample
+LARGEST_DIRECT = 0.05  # largest height of such a peak per e-fold of rate: twice the largest direct effect of rocks
 WILD = "far off the samples beside"
 OFF_FIT = "so far off the fit that half of its misfit and more was there"
 OUTLIER_SIZE = 20.0  # least size of an outlier, in rms of the other residuals
-MAX_OUTLIERS = 2e-3  # largest share of samples that are outliers; more of them are no faults of single samples
+MAX_OUTLIERS = 2e-3  # largest share of outliers in a record; more of them have a common cause
 
 
 def without_clipped(record: Record) -> Record:
@@ -41,10 +41,10 @@ def without_clipped(record: Record) -> Record:
 
 
 def without_wild(record: Record) -> Record:
-    """Record without single samples of friction that are far off those beside them, with a note.
+    """Record without single samples of friction that are far off their neighbours, with a note.
 
-    Kept are those at a change of the loading that may be a peak of friction, and all where the displacement does not
-    tell when it changes.
+    Samples that may be a peak of friction after a change of the loading are kept. If the displacement was not measured,
+    the times of these changes are unknown and all samples are kept.
     """
     if record.loading.load is None or len(record) < 10 * BESIDE:
         return record
@@ -61,7 +61,7 @@ def without_wild(record: Record) -> Record:
 
 
 def without_outliers(record: Record, residuals: Array) -> Record:
-    """Record without the few samples, if there are such, that contribute half of the squares of residuals (n,)."""
+    """Record without outliers: the few samples, if any, that make half of the sum of squares of `residuals` (n,)."""
     squares = residuals**2
     order = np.argsort(-squares)
     gone = np.cumsum(squares[order])
@@ -74,7 +74,7 @@ def without_outliers(record: Record, residuals: Array) -> Record:
 
 
 def _without(record: Record, out: Array, why: str) -> Record:
-    """Record without samples of friction, with a note; the loading stays as all of them show it."""
+    """Record without the samples where the mask `out` (n,) is true, with a note; keeps the loading found in all."""
     if not np.any(out):
         return record
     first, last = record.time[out][[0, -1]]
@@ -84,7 +84,7 @@ def _without(record: Record, out: Array, why: str) -> Record:
 
 
 def _off_those_beside(values: Array) -> tuple[Array, Array]:
-    """Deviations of values (n,) from the median of those beside each, and mask of those that are far off."""
+    """Deviation (n,) of each value from the median of its neighbours, and mask (n,) of values that are far off."""
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, BESIDE, mode="reflect"), 2 * BESIDE + 1)
     beside = np.delete(windows, BESIDE, axis=1)
     away = values - np.median(beside, axis=1)
@@ -93,7 +93,7 @@ def _off_those_beside(values: Array) -> tuple[Array, Array]:
 
 
 def clipped(values: Array) -> Array:
-    """Mask (n,) of the samples of values (n,) around runs of the largest value that chance does not make."""
+    """Mask (n,) of samples at an upper limit of the channel: runs of the largest value that are too long for chance."""
     found = np.zeros(len(values), dtype=bool)
     top = np.flatnonzero(values == np.max(values))
     if len(top) < SHORTEST:
@@ -112,9 +112,9 @@ def clipped(values: Array) -> Array:
 
 
 def flattened(values: Array) -> Array:
-    """Mask (n,) of the samples of values (n,) around its largest that lie on a plateau quieter than the noise.
+    """Mask (n,) of samples at an upper limit of the channel: plateaus at the largest values, quieter than the noise.
 
-    A channel cuts peaks and the noise on them off before a later stage adds noise of its own.
+    The channel cuts off peaks with the noise on them; later stages of the amplifier add noise to the flat top.
     """
     found = np.zeros(len(values), dtype=bool)
     noise = spread(np.diff(values, 2)) / np.sqrt(6.0)
@@ -129,7 +129,7 @@ def flattened(values: Array) -> Array:
 
 
 def _is_cut_off(values: Array, peak: Array) -> bool:
-    """True if the channel came to a peak and left it as fast as it moves elsewhere; steady sliding it approaches."""
+    """True if the values reach and leave a peak abruptly; friction that approaches steady sliding does not."""
     if peak[0] == 0 or peak[-1] == len(values) - 1:
         return False
     moved = np.abs(np.diff(values))

@@ -1,4 +1,4 @@
-"""Roles and units of the columns of a table, from their names or from the user's options."""
+"""Roles and units of the columns of a table, found in their names or given by the user."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _SUFFIXES = ("s", "ms", "min", "h", "m", "cm", "mm", "um", "nm", "Pa", "kPa", "M
 _TIMES = {"time", "times", "elapsed", "elapsedtime", "uhrzeit", "datetime", "date", "datum", "tiempo", "tempo"}
 _FRICTION = re.compile(r"friction|fricción|rozamiento|attrito|^reib(ungs?)?(wert|zahl|koeff|beiwert|$)")
 _DISPLACED = re.compile(r"disp|position|slip|ram|verschieb|vorschub|weg$|déplacement|desplaza|spostament")
-LETTERS = ("x", "X", "d")  # letters for a displacement, in a unit of length; D is a diameter or a thickness as well
+LETTERS = ("x", "X", "d")  # letters for a displacement; not D, which may be a diameter or a thickness
 _ACROSS = re.compile(r"normalweg|vertikal|normalversch")
 _SHEAR = re.compile(
     r"shear|tau|τ|scher|schub|reibkraft|reibungskraft|tangential|querkraft|cisaillement|cortante|cizall|tagli|tangenzial"
@@ -59,8 +59,9 @@ class Column:
         Name in the file.
     unit : str
     factor : float
-        Factor to SI; forces have still to be divided by an area.
+        Factor to SI units, without the division of a force by an area.
     force : bool
+        True if a shear or normal stress was measured as a force.
     place : int
         Index of the column; needed because names may occur twice.
     """
@@ -104,7 +105,7 @@ def split_name(name: str) -> tuple[str, str | None]:
 
 
 def known_unit(text: str) -> str | None:
-    """Unit in this package's spelling; None if it is none."""
+    """Unit in the spelling of this package, such as um for microns; None if `text` is no unit."""
     text = text.strip()
     spelled = _SPELLINGS.get(text.lower(), text)
     if not spelled:
@@ -117,7 +118,7 @@ def known_unit(text: str) -> str | None:
 
 
 def guess_role(name: str, has_unit: str | None) -> str | None:
-    """Role suggested by a name and its unit; None if none is."""
+    """Role that a column has by its name (without unit) and its unit; None if they suggest no role."""
     plain = re.sub(r"[^a-zµμστäöüßéèóáíñàç]+", " ", name.lower().replace("_", " ")).strip()
     words = set(plain.split())
     dimension = None if has_unit is None else unit(has_unit)[1]
@@ -150,7 +151,7 @@ def guess_role(name: str, has_unit: str | None) -> str | None:
 def assign_columns(
     names: Sequence[str], given: Mapping[str, Any], file_units: Sequence[str | None]
 ) -> tuple[dict[str, Column], list[Problem], list[str]]:
-    """Find a column for every role.
+    """Column of every role, from the user's options or else from the names of columns.
 
     Parameters
     ----------
@@ -213,7 +214,7 @@ def assign_columns(
 def _from_option(
     role: str, value: Any, names: Sequence[str], heads: Sequence[str]
 ) -> tuple[int | None, str | None, str | None]:
-    """(column, unit, fault) from a user's option; fault is None if it is valid."""
+    """Index of a column, its unit, and a message on a fault from a user's option; each None if there is none."""
     stated: str | None = None
     if isinstance(value, Mapping):
         unknown = set(value) - {"column", "unit"}
@@ -238,7 +239,7 @@ def _from_option(
             if value in known:
                 places = [i + 1 for i, name in enumerate(known) if name == value]
                 several = f"columns {', '.join(map(str, places[:-1]))} and {places[-1]} are named {value!r}"
-                return None, None, f"{several}; give the number of one"
+                return None, None, f"{several}; give the number of the column"
         found = known_unit(value)
         if stated is None and found is not None and _fits(role, found):
             return None, found, None
@@ -246,13 +247,13 @@ def _from_option(
 
 
 def _fits(role: str, name: str) -> bool:
-    """True for a unit of a role, including forces for stresses."""
+    """True if the unit `name` is allowed for a role; stresses may be given as forces."""
     dimension = unit(name)[1]
     return dimension == unit(ROLES[role])[1] or (role in ("shear", "normal") and dimension == unit("N")[1])
 
 
 def _preferred(role: str, candidates: list[int], names: Sequence[str]) -> list[int]:
-    """Candidates whose names mention the load point or effective stress, or are more than a letter; else all."""
+    """Candidates whose names mention the load point or effective stress, or have two letters; all if none does."""
     if len(candidates) < 2:
         return candidates
     marks = {"displacement": (r"load|lp|shear|ram", r"^\W*\w{2}"), "velocity": (r"load|lp",), "normal": (r"eff",)}
@@ -263,19 +264,20 @@ def _preferred(role: str, candidates: list[int], names: Sequence[str]) -> list[i
 
 
 def _missing(role: str, names: Sequence[str]) -> str:
-    return f"no column for it; the file has {listed(map(repr, names))}; name it with {role}=NAME"
+    return f"no column for it; the file has {listed(map(repr, names))}; name one with {role}=NAME"
 
 
 def _with_unit(
     role: str, name: str, own: str | None, stated: str | None
 ) -> tuple[Column | None, str | None, list[str]]:
-    """(column, fault, notes) with the unit of a column: from its name or the option, which must agree and fit
-    the role.
+    """Column with its unit, message on a fault (or None), and notes.
+
+    The unit comes from the name or the option, which must not contradict each other, and must fit the role.
     """
     notes: list[str] = []
     stated = None if stated is None else known_unit(stated)
     if own is not None and stated is not None and unit(own) != unit(stated):
-        fault = f"column {name!r} is in {own} by its name, but {stated} is asked for; make them agree"
+        fault = f"column {name!r} is in {own} by its name, but the option says {stated}; make them agree"
         return None, fault, notes
     found = stated or own
     if found is None:
@@ -308,5 +310,5 @@ def missing_roles(columns: Mapping[str, Column], names: Sequence[str]) -> list[P
     if "friction" not in columns and not {"shear", "normal"} <= set(columns):
         lacking = [role for role in ("shear", "normal") if role not in columns]
         message = f"no column for friction, nor for {' and '.join(lacking)} to compute it from; the file has "
-        problems.append(Problem("friction", message + f"{listed(map(repr, names))}; name it with friction=NAME"))
+        problems.append(Problem("friction", message + f"{listed(map(repr, names))}; name one with friction=NAME"))
     return problems

@@ -1,4 +1,4 @@
-"""Record of a machine: columns that are named as a run of the machine names them, in SI units."""
+"""Record of a machine: columns in SI units, with the names that a simulated run gives them, such as ``table.x``."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ class MotionRecord(ReadOnly):
     time : ndarray (n,)
         Rising times, s.
     columns : dict of str to ndarray (n,)
-        By the name that a run of the machine has for it, such as ``table.x``, ``motor.v``, ``guide.friction_force`` or
-        ``links.screw.force``; SI units.
+        Values in SI units by the name that a simulated run of the machine uses: ``table.x``, ``motor.v``,
+        ``guide.friction_force``, ``links.screw.force``.
     units : dict of str to str
-        Units that the columns had; empty for columns in SI units.
+        Units that the columns had in the file; empty text for columns in SI units.
     source : str
     notes : tuple of str
-        Everything that was noticed or changed.
+        Notes on everything that was noticed or changed.
     """
 
     time: Array = field(repr=False)
@@ -87,10 +87,10 @@ def read_motion(
     path : path
         Any file that `read_record` reads.
     columns : mapping of str to str, int or (str or int, str), optional
-        By the name that a run of the machine has for it: the heading of the column or its number from 1, or a pair of
-        that and its unit. Without, all columns are read whose heading is such a name: ``table.x (um)``.
+        Heading or number (from 1) of each column, or a pair of that and a unit, by the name that a simulated run of the
+        machine uses, such as ``table.x``. By default all columns with such a heading are read: ``table.x (um)``.
     time : str, int or pair, optional
-        Column of the time, where its heading does not say so.
+        Column of the time, if its heading does not say so.
     table, between, sampling, skip_bad_lines
         As in `read_record`.
 
@@ -123,12 +123,12 @@ def read_motion(
         wanted = {TIME: clocks[0] + 1 if time is None else time} | wanted
     elif sampling is None:
         problems.append(
-            Problem(TIME, f"no column for it; the file has {listed(map(repr, raw.names))}; name it with time=NAME")
+            Problem(TIME, f"no column for it; the file has {listed(map(repr, raw.names))}; name one with time=NAME")
         )
     if not set(wanted) - {TIME}:
         message = (
-            f"no heading is a name such as 'table.x (um)'; the file has {listed(map(repr, raw.names))}; say which is "
-            "what: {'table.x': 'encoder'}"
+            f"no heading is a name such as 'table.x (um)'; the file has {listed(map(repr, raw.names))}; give the "
+            "heading of each column: {'table.x': 'encoder'}"
         )
         problems.append(Problem("columns", message))
     si: dict[str, Array] = {}
@@ -156,23 +156,24 @@ def read_motion(
 def _found(
     asked: Any, names: Sequence[str], heads: Sequence[str], units: Sequence[str | None]
 ) -> tuple[int | None, str | None, str]:
-    """Index and unit of a column, and what is wrong with it."""
+    """Index and unit of a column (None if unknown), and a message on what is wrong with it (empty if nothing)."""
     column, own = asked if isinstance(asked, (tuple, list)) and len(asked) == 2 else (asked, None)
     if isinstance(column, int) and not isinstance(column, bool) and 1 <= column <= len(names):
         place = column - 1
     else:
         places = [i for known in (names, heads) for i, name in enumerate(known) if name == column]
         if len(set(places)) > 1:
-            return None, None, f"several columns are named {column!r}; give the number of one"
+            return None, None, f"several columns are named {column!r}; give the number of the column"
         if not places:
             return None, None, unknown_name("column", column, names)
         place = places[0]
     found = known_unit(own) if isinstance(own, str) else units[place]
     if found is None:
-        told = f"got the unit {own!r}, which is none" if own is not None else f"column {names[place]!r} has no unit"
-        return place, None, f"{told}; write it in the heading, such as 'table.x (um)', or give ('{names[place]}', 'um')"
+        fault = f"got the unknown unit {own!r}" if own is not None else f"column {names[place]!r} has no unit"
+        advice = f"write it in the heading, such as 'table.x (um)', or give ('{names[place]}', 'um')"
+        return place, None, f"{fault}; {advice}"
     if own is not None and units[place] is not None and unit(found) != unit(str(units[place])):
-        return place, None, f"column {names[place]!r} is in {units[place]} by its heading, but {found} is asked for"
+        return place, None, f"column {names[place]!r} is in {units[place]} by its heading, but the option says {found}"
     return place, found, ""
 
 
@@ -185,7 +186,7 @@ def motion_from_arrays(time: Any, columns: Mapping[str, Any], *, source: str = "
     time : array_like
         s.
     columns : mapping of str to array_like
-        By the name that a run of the machine has for it: ``table.x``, ``guide.friction_force``.
+        Values by the name that a simulated run of the machine uses: ``table.x``, ``guide.friction_force``.
     source : str, optional
 
     Raises
@@ -234,17 +235,17 @@ def read_frequency_response(path: str | PathLike[str], *, averages: int = 1) -> 
     path : path
         ``.csv`` with a column ``frequency`` (Hz) and columns such as ``table.x/motor.x real [m/s^2/N]`` and ``imag``,
         or ``magnitude`` and ``phase [deg]``, and perhaps ``coherence``; ``.uff``, ``.unv`` or ``.mat`` as for a body's
-        `response`. A body's name with ``.x`` is its displacement, or the force on it; with ``.y`` that away from the
-        surface.
+        `response`. ``table.x`` is the displacement of the body ``table``, or the force on it, along the surface;
+        ``table.y`` away from the surface.
     averages : int, optional
-        Averages behind the coherence.
+        Number of averages from which the coherence was computed.
 
     Raises
     ------
     NotAvailable
         If the file cannot be read.
     ParameterError
-        If its numbers make no responses.
+        If its columns are not frequency responses.
 
     Examples
     --------
@@ -259,7 +260,7 @@ def read_frequency_response(path: str | PathLike[str], *, averages: int = 1) -> 
 
 
 def is_response(path: str | PathLike[str]) -> bool:
-    """True for files of responses over frequency: universal files, and tables that begin with a frequency."""
+    """True for a file of frequency responses: a universal file, or a table whose first column is the frequency."""
     place = Path(path)
     ending = place.suffix.lower()
     if ending in (".uff", ".unv"):
@@ -269,7 +270,7 @@ def is_response(path: str | PathLike[str]) -> bool:
 
         try:
             return "frequency" in [name for name, _, _ in whosmat(io.BytesIO(read_bytes(place, MOST_RESPONSES)))]
-        except Exception:  # SciPy raises whatever a damaged file leads to; who reads it says what is wrong
+        except Exception:  # SciPy raises anything for a damaged file; `read_motion` reports what is wrong with it
             return False
     if ending != ".csv":
         return False

@@ -47,13 +47,13 @@ def read_record(
     Parameters
     ----------
     path : path
-        Text with any of the usual separators, with or without header, times in numbers, as a clock (``12:30:01.5``) or
-        with a date (ISO 8601); HDF5 (``.h5``, ``.hdf5``), MATLAB (``.mat``), Parquet (``.parquet``), Excel (``.xlsx``),
-        TDMS (``.tdms``), netCDF (``.nc``, saved runs among them); binary files of XLOOK, whatever their name.
+        Text with any of the usual separators, with or without header; times are numbers, times of day (``12:30:01.5``)
+        or dates (ISO 8601). Also HDF5 (``.h5``, ``.hdf5``), MATLAB (``.mat``), Parquet (``.parquet``), Excel
+        (``.xlsx``), TDMS (``.tdms``), netCDF (``.nc``, such as saved runs), and binary files of XLOOK with any name.
     area : float or str, optional
         Contact area, m^2, if shear and normal are forces; by default 1 m^2, so that forces stay forces.
     normal_stress : float or str, optional
-        Constant normal stress, Pa, if there is no column of it.
+        Constant normal stress, Pa, if the file has no column for it.
     table : str, optional
         Group of an HDF5 or TDMS file, variable of a MATLAB file (``p1``, ``p1.data`` in a structure, ``p(2)`` in an
         array of them), or sheet of a workbook.
@@ -68,12 +68,12 @@ def read_record(
         is computed from displacement and velocity if both were measured.
     **columns
         Columns by role: ``time``, ``displacement`` and ``velocity`` (of the load point), ``friction``, ``shear``,
-        ``normal``, ``pore_pressure``. A column that has none is left out, with a note.
+        ``normal``, ``pore_pressure``. A column without a role is left out, with a note.
 
     Returns
     -------
     Record
-        Its `notes` tell everything that was changed.
+        Its `notes` list everything that was changed.
 
     Raises
     ------
@@ -114,7 +114,9 @@ def read_record(
         si[role] = own * (column.factor / (size if column.force else 1.0))
         notes.append(f"{role}: column {column.name!r}" + _format_unit(column, size, area is None))
         if role == "displacement" and ACROSS.search(column.name):
-            notes.append("that is measured across the fault, by its name, and cannot show how a servo follows")
+            notes.append(
+                "this displacement is measured across the fault, by its name, and cannot show how a servo follows"
+            )
     taken = {column.place for column in found.values()}
     if unread := [repr(name) for i, name in enumerate(raw.names) if i not in taken]:
         notes.append(f"left out: {listed(unread)}; to use a column give its role, such as pore_pressure=NAME")
@@ -149,7 +151,7 @@ def _clock(sampling: Any, rate: Any, roles: set[str]) -> Callable[[dict[str, Arr
 
 
 def _integrated_time(displacement: Array, velocity: Array) -> Array:
-    """Elapsed time (s) from displacement and velocity: each interval at its mean velocity; zero where nothing moves."""
+    """Elapsed time (s) at each row from displacement and velocity; no time passes where nothing moves."""
     with np.errstate(divide="ignore", invalid="ignore"):
         spent = np.diff(displacement) / (0.5 * (velocity[1:] + velocity[:-1]))
     return np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(spent), np.maximum(spent, 0.0), 0.0))])
@@ -158,7 +160,7 @@ def _integrated_time(displacement: Array, velocity: Array) -> Array:
 def cut_between(
     si: dict[str, Array], lines: Array, between: tuple[Any, Any], notes: list[str]
 ) -> tuple[dict[str, Array], Array]:
-    """Rows between two times; other rows may be damaged."""
+    """Columns and line numbers of the rows between two times; rows outside may have missing numbers."""
     first, last = seconds("start", between[0]), seconds("end", between[1])
     with np.errstate(invalid="ignore"):
         rows = (si["time"] >= first) & (si["time"] <= last)
@@ -171,7 +173,7 @@ def cut_between(
 
 
 def checked_option(name: str, unit: str, value: Any) -> float:
-    """Positive number in the SI unit, from one or from text with a unit."""
+    """Positive number in the SI unit `unit`, from a number or text with a unit."""
     try:
         return Parameter(unit, positive, name).checked(value)
     except ParameterError as error:

@@ -29,7 +29,7 @@ from steadyslip.files.output import write_columns
 FEWEST_ROWS = 20
 """Least number of samples of a record; chosen by trial: fewer do not determine rates and noise."""
 DRIFT = 0.02
-"""Change of the normal stress, as a share, within which a servo may wander without a command; chosen by trial."""
+"""Relative change of the normal stress that counts as drift of the servo, not as a command; chosen by trial."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +56,10 @@ class Record(Displayed, HasCache):
     integrated : bool
         True if the displacement is the integral of the velocity.
     worth : ndarray (n,) or None
-        Number of independent measured samples that each sample (a mean of several) is worth, less than their count
-        where noise is correlated; None if each sample was measured. Weights of fits.
+        Weights in fits: the number of independent measured samples behind each sample, which is a mean of several
+        (fewer than their count where noise is correlated); None if each sample was measured.
     commanded : Loading or None
-        Commanded loading, if it was found in more samples than these.
+        Commanded loading, if it was found before samples were left out or averaged.
     """
 
     time: Array = field(repr=False)
@@ -87,7 +87,8 @@ class Record(Displayed, HasCache):
     def loading(self) -> Loading:
         """Commanded loading, as found in the measured displacement and normal stress.
 
-        A displacement that moves with friction, as across the fault, is followed without what the spring between takes.
+        From a displacement that moves with friction, such as one across the fault, the stretch of the spring between
+        it and the load point is removed first.
         """
         if self.commanded is not None:
             return self.commanded
@@ -97,7 +98,7 @@ class Record(Displayed, HasCache):
             load = load if behind is None else behind.course
         total = self.total_normal
         pore = None
-        if self.pore_pressure is not None and total is not None:  # counted so that no level of it is zero
+        if self.pore_pressure is not None and total is not None:  # shifted so that it is never zero
             size = float(np.mean(total))
             pore = stress_course(self.time, self.pore_pressure + size).lowered(size)
         return Loading(load, None if total is None else stress_course(self.time, total), pore)
@@ -111,7 +112,7 @@ class Record(Displayed, HasCache):
 
     @cached_property
     def stress_changes(self) -> bool:
-        """Whether the normal stress was changed: at once, by ramps, in waves, or by more than servos let it drift."""
+        """True if the normal stress was changed: by steps, ramps or oscillations, or more than a servo drifts."""
         stress = self.loading.stress
         if stress is None:
             return False
@@ -122,7 +123,7 @@ class Record(Displayed, HasCache):
 
     @cached_property
     def pressure_changes(self) -> bool:
-        """Whether the pore pressure was changed: at once, by ramps, or smoothly by more than drifts."""
+        """True if the pore pressure was changed: by steps or ramps, or smoothly by more than a drift."""
         pore = self.loading.pore
         if pore is None or self.normal is None:
             return False
@@ -130,12 +131,12 @@ class Record(Displayed, HasCache):
 
     @cached_property
     def initial_rate(self) -> float | None:
-        """Load-point rate before its first change, m/s; None if the displacement was not measured."""
+        """Load-point velocity before its first change, m/s; None if the displacement was not measured."""
         return None if self.loading.load is None else float(self.loading.load.at(self.time[:1])[0])
 
     @cached_property
     def rate(self) -> Array | None:
-        """Load-point rate at the samples, m/s: measured, or slopes over seven samples."""
+        """Load-point velocity at the samples, m/s: measured, or the slope of the displacement over seven samples."""
         if self.velocity is not None or self.displacement is None:
             return self.velocity
         half = 3
@@ -145,7 +146,7 @@ class Record(Displayed, HasCache):
         return np.asarray(read_only(rate))
 
     def taken(self, rows: Any, note: str) -> Record:
-        """Record with some of the samples, and a note."""
+        """Record with only the samples that `rows` (mask, slice or indices) selects, with a note."""
 
         def of(values: Array | None) -> Array | None:
             return None if values is None else frozen(values[rows])
@@ -172,17 +173,19 @@ class Record(Displayed, HasCache):
     def decimated(self, count: int) -> Record:
         """Record of about `count` samples, dense after every change and sparse in steady parts.
 
-        Each sample is the mean of measured samples between two changes; `worth` is what it is worth in them.
+        Each sample is the mean of measured samples between two changes; `worth` is the number of independent measured
+        samples that it stands for.
         """
         if count >= len(self):
             return self
         return binned(self, bin_starts(self, count))
 
     def detrended(self, order: int = 1) -> Record:
-        """Record with friction less a polynomial in the load point's displacement (or in time, if that is unknown).
+        """Record with a trend subtracted from friction: a polynomial in the load point's displacement.
 
-        The polynomial is fitted to the parts before every change and at the end, where friction is steady, each with a
-        level of its own. The ``trend`` of a fit does the same with propagated errors, and should be preferred.
+        Time takes the place of the displacement if that was not measured. The polynomial is fitted to the steady parts
+        before every change and at the end; its constant differs between parts. Better use the option ``trend`` of a
+        fit, which fits the trend together with the law, so that confidence intervals include its uncertainty.
         """
         if not (isinstance(order, int) and 1 <= order <= 5):
             raise ParameterError([Problem("order", f"got {order!r}; allowed: a whole number from 1 to 5")])
@@ -196,8 +199,8 @@ class Record(Displayed, HasCache):
                 rows.append(part)
         if not rows:
             raise NotAvailable(
-                f"no part between steps has {FEWEST_ROWS} samples or more, so that no trend can be told from the "
-                "steps; fit with trend= instead"
+                f"no part between steps has {FEWEST_ROWS} samples or more, so that a trend cannot be separated from "
+                "the steps; fit with trend= instead"
             )
         level = np.zeros((sum(map(len, rows)), len(rows)))
         place = 0
@@ -215,9 +218,9 @@ class Record(Displayed, HasCache):
         return replace(self, friction=frozen(self.friction - trend), shear=None, notes=(*self.notes, note))
 
     def windows(self, before: Any = None, after: Any = None) -> tuple[Record, ...]:
-        """Parts around each velocity step, hold with its reslide, or step of normal stress.
+        """Parts of the record around each velocity step, hold with its reslide, or step of normal stress.
 
-        Rates, stresses and the response of a servo are those found in the whole record.
+        Each part keeps the loading (rates, stresses, response of a servo) that was found in the whole record.
 
         Parameters
         ----------
@@ -239,7 +242,7 @@ class Record(Displayed, HasCache):
         return tuple(found)
 
     def summary(self) -> str:
-        """Summary in a few lines."""
+        """Summary as text: duration, ranges of the columns, steps found and notes."""
         span = self.time[-1] - self.time[0]
         spacing = np.diff(self.time)
         low, high = float(np.min(self.friction)), float(np.max(self.friction))
@@ -271,7 +274,7 @@ class Record(Displayed, HasCache):
         return self.summary()
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw friction, load-point rate and normal stress in time, with the steps found.
+        """Plot friction, load-point velocity and normal stress over time, with the steps found.
 
         Returns
         -------
@@ -302,12 +305,12 @@ _OPTIONAL = ("normal", "shear", "displacement", "velocity", "pore_pressure")
 def whole_record(
     source: str, notes: tuple[str, ...], integrated: bool, commanded: Loading | None = None, **columns: Array | None
 ) -> Record:
-    """Record from columns that were saved from a clean one.
+    """Record from columns that were saved from a cleaned record.
 
     Raises
     ------
     ParameterError
-        If they are not clean: times that do not rise, non-finite numbers, too few samples.
+        If times do not rise, numbers are not finite, or samples are too few.
     """
     present = {name: frozen(values) for name, values in columns.items() if values is not None}
     time = present["time"]
@@ -355,7 +358,7 @@ def transient_rows(record: Record, count: int) -> Array:
 
 
 def bin_starts(record: Record, count: int) -> Array:
-    """Index of the first row of each group that is averaged to one sample; no group spans a change of the loading."""
+    """Indices of the first rows of some `count` groups to be averaged; no group spans a change of the loading."""
     cumulated = np.cumsum(_samples_wanted(record, count))
     fresh = np.flatnonzero(np.diff(np.floor(cumulated - 1e-9), prepend=-1.0))
     moments = [m for step in record.steps for m in (step.time, step.time + step.duration)]
@@ -364,7 +367,7 @@ def bin_starts(record: Record, count: int) -> Array:
 
 
 def binned(record: Record, starts: Array) -> Record:
-    """Record whose samples are the means of groups of rows; `starts` has the first row of each group."""
+    """Record whose samples are the means of groups of rows; `starts` holds the first row of each group."""
     counts = np.diff(starts, append=len(record))
     weights = np.ones(len(record)) if record.worth is None else record.worth
     total = np.add.reduceat(weights, starts)
@@ -383,7 +386,7 @@ def binned(record: Record, starts: Array) -> Record:
 
 
 def _samples_wanted(record: Record, count: int) -> Array:
-    """Number of samples, at most 1, that each row is worth, `count` in all: per second as 1/(time since a change)."""
+    """Share (n,) of a sample for each row, at most 1, `count` in all; the density falls as 1/(time since a change)."""
     time, n = record.time, len(record)
     usual = float(np.median(np.diff(time)))
     weight = np.full(n, 1.0 / (time[-1] - time[0]))  # samples wanted per second

@@ -1,4 +1,4 @@
-"""Whether two records are one measurement, whole, cut, thinned or averaged: it must not count twice."""
+"""Test whether two records come from the same measurement, which must not count twice in a fit."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import numpy as np
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.splitting import displacement_noise, spread
 
-FEWEST_SHARED, LEAST_SHARED = 8, 0.5  # samples, and share of the sparser record, that two must share to be one
-SAME_NOISE = 0.3  # scatter of their difference, in that of its noise: 1 or more of two experiments, 0 of one
+FEWEST_SHARED, LEAST_SHARED = 8, 0.5
+"""Least overlap of two records of one measurement: number of samples, and share of the record with fewer samples."""
+SAME_NOISE = 0.3  # largest scatter of the difference over the noise: at least 1 for two experiments, 0 for the same
 
 
 def is_same_measurement(one: Record, other: Record) -> bool:
-    """True if two records have the same noise where they overlap, so that one is the other, cut, thinned or averaged.
+    """True if one record is the other after cutting, thinning or averaging: both have the same noise in the overlap.
 
-    The noise of two experiments is independent, and so their difference has at least that of the sparser one.
+    The noise of two experiments is independent, so the difference of their friction has at least the noise of the
+    record with fewer samples.
     """
     fine, sparse = (one, other) if len(one) >= len(other) else (other, one)
     inside = (sparse.time >= fine.time[0]) & (sparse.time <= fine.time[-1])

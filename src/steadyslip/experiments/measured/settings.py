@@ -1,4 +1,4 @@
-"""Options of the table ``[record]`` of a file: how to read records."""
+"""Options for reading records, as in the table ``[record]`` of a fit file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FEWEST_KEPT = 50
 
 
 class ColumnSettings(Settings):
-    """A column of a record and its unit; a name, a number or a unit alone stands for it."""
+    """Column of a record and its unit; in a file, a name, a number or a unit alone may stand for the table."""
 
     short = ("column", "unit")
     column: str | int | None = setting(Label("name in the file, number from 1, or unit"), default=None)
@@ -63,7 +63,7 @@ class RecordSettings(Settings):
     averages: int = setting(Whole("of a machine: averages behind the coherence of frequency responses", 1), default=1)
 
     def arguments(self) -> dict[str, Any]:
-        """Options as keyword arguments of `read_record`, and ``decimate``; only those that the file gives."""
+        """Options that the file gives, as keyword arguments of `read_record`, and ``decimate``."""
         found = given(self)
         for role in ROLES:
             if role in found:

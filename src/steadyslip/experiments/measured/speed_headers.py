@@ -1,4 +1,4 @@
-"""What the header of a column says in tables of speeds and loops: its role, its unit, its direction, what is wrong."""
+"""Role, unit and direction of a column from its header in tables of speeds and loops, and faults of the unit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ UNITS_OF_ROLES = {
     "speed": ("m/s", "rad/s"), "force": ("N",), "torque": ("N m",), "friction": ("1",), "load": ("N", "kg", "N m"),
     "displacement": ("m", "rad"), "direction": ("1",),
 }  # fmt: skip
-"""Units of each role, the first where the file has none."""
+"""Allowed units of each role; the first is assumed if the file gives none."""
 _WORDS = {
     "direction": r"dir|direction|richtung|sense|sinn",
     "load": r"load|normal|normalkraft|normalforce|last|preload|vorspann|vorspannung|fn|belastung|clamp|weight",
@@ -23,11 +23,11 @@ _WORDS = {
     "speed": r"speed|velocity|vel|v|rate|geschw|geschwindigkeit|drehzahl|n|omega|ω|w|feed|vorschub|feedrate|qd|dq",
     "displacement": r"displacement|disp|position|pos|x|s|weg|angle|winkel|deflection|presliding|q|phi|φ",
 }
-"""Words of headers by role."""
+"""Names of columns by role (regular expressions)."""
 SCATTER = re.compile(
     r"(?i)(?<![a-zäöü])(σ|sigma|std|stdev|sd|error|err|uncertainty|streuung|standardabweichung)(?![a-zäöü])"
 )
-"""Words of headers whose column is the scatter of another."""
+"""Words in the header of a column that holds the scatter of another column."""
 SPELLED = {
     "nm": "N m", "n·m": "N m", "n.m": "N m", "n*m": "N m", "mnm": "mN m", "nmm": "N mm", "ncm": "N cm", "knm": "kN m",
     "u/min": "rpm", "min-1": "rpm", "1/min": "rpm", "r/min": "rpm", "rev/min": "rpm", "rps": "rev/s",
@@ -36,7 +36,7 @@ SPELLED = {
 
 
 def split_head(name: str, apart: str | None) -> tuple[str, str | None]:
-    """Name of a column without its unit, and its unit."""
+    """Name of a column without its unit, and its unit (None if unknown); `apart` is a unit given beside the name."""
     head, own = split_name(name)
     if own is None:
         match = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name) or re.fullmatch(
@@ -50,7 +50,7 @@ def split_head(name: str, apart: str | None) -> tuple[str, str | None]:
 
 
 def role_of(head: str, own: str | None) -> str | None:
-    """Role of a column by its name and unit; None if none is, or if they contradict each other."""
+    """Role of a column from its name and unit; None if there is none or if they contradict each other."""
     if SCATTER.search(head):
         return None
     if _is_other(head, own):
@@ -70,16 +70,16 @@ def role_of(head: str, own: str | None) -> str | None:
 
 
 def roles_named(head: str) -> list[str]:
-    """Roles that the name of a column says, without its unit."""
+    """Roles that a column may have by its name, whatever its unit."""
     words = {word for word in re.split(r"[^a-zµμφωäöüß]+", head.lower()) if word}
     words.add(re.sub(r"[^a-zµμφωäöüß]", "", head.lower()))
     return [role for role, pattern in _WORDS.items() if any(re.fullmatch(pattern, word) for word in words)]
 
 
 def misfit(head: str, own: str | None) -> str:
-    """What is wrong with the unit of a column that is named like a speed, force, torque or load; empty if it fits.
+    """Message on a unit that contradicts a column's name (speed, force, torque or load); empty if it fits.
 
-    Names of one letter say little: a mass may be m or t, a temperature T, a displacement s.
+    Names of one letter are ambiguous and tested less strictly: a mass may be m or t, a temperature T, a displacement s.
     """
     name, said = split_bracket(head, own)
     kinds = [role for role in roles_named(name) if role in ("force", "torque", "speed", "load")]
@@ -104,24 +104,24 @@ def misfit(head: str, own: str | None) -> str:
 
 
 _MULTIPLIED = {"A": "; multiply a current by the constant of the motor, N/A or N m/A",
-               "V": "; multiply a voltage by what the sensor has of it, such as N/V"}  # fmt: skip
+               "V": "; multiply a voltage by the constant of the sensor, such as N/V"}  # fmt: skip
 """Advice by the last letter of a unit."""
 _TEMPERATURES = ("c", "k", "f", "degc", "degf", "celsius", "kelvin", "fahrenheit")
 
 
 def split_bracket(head: str, own: str | None) -> tuple[str, str]:
-    """Name of a column without a unit in brackets that is not known, and its unit or an empty text."""
+    """Name of a column without a bracket that holds an unknown unit, and its unit (empty if it has none)."""
     bracket = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", head)
     return (bracket[1], own or bracket[2]) if bracket else (head, own or "")
 
 
 def _is_letter(name: str) -> bool:
-    """True for a name of one letter that may be of many things."""
+    """True for an ambiguous name: a single letter other than F, which is a force."""
     return len(name) == 1 and name.lower() != "f"
 
 
 def _is_other(head: str, own: str | None) -> bool:
-    """True for a temperature, and for a name of one letter with a unit that no column of such tables has."""
+    """True for a column of another quantity: a temperature, or one letter with a unit that no role allows."""
     name, said = split_bracket(head, own)
     if said.lower().replace("°", "").replace("℃", "c") in _TEMPERATURES:
         return True
@@ -132,7 +132,7 @@ def _is_other(head: str, own: str | None) -> bool:
 
 
 def direction_of(head: str) -> int:
-    """1 for a name that says forward, -1 backward, 0 neither."""
+    """1 if the name of a column contains a word for forward, -1 for backward, 0 for neither or both."""
     words = [word for word in re.split(r"[\s_()\[\],.]+", head.lower()) if word]
     words += [head[-1]] if head and head[-1] in "+-−–" else []
     forward, backward = (any(re.fullmatch(side, word) for word in words) for side in (FORWARD, BACKWARD))

@@ -1,4 +1,4 @@
-"""Reading of friction measured at constant speeds, and of loops of displacement and force before sliding."""
+"""Reading of tables of friction at constant speeds, and of loops of force over displacement before sliding."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ from steadyslip.experiments.measured.table_questions import questions_of_table
 from steadyslip.experiments.measured.words_in_tables import without_words
 
 WEIGHT = 9.80665  # m/s², standard gravity, for loads in kg
-FEWEST_ROWS = 3  # speeds of sliding: two make a line through anything
+FEWEST_ROWS = 3  # least number of speeds: a straight line fits any two
 
 
 @dataclass(frozen=True)
 class SpeedTable:
-    """Friction at constant speeds, by rows.
+    """Table of friction at constant speeds, one row for each speed.
 
     Attributes
     ----------
@@ -48,18 +48,18 @@ class SpeedTable:
     speed : ndarray (n,)
         m/s, or rad/s where `turns`; negative backward.
     friction : ndarray (n,)
-        Positive: N, N m where `turns`, or a coefficient where `is_coefficient`.
+        Positive: a force (N), a torque (N m) if `turns`, or a coefficient if `is_coefficient`.
     load : ndarray (n,) or None
-        N, or N m where `load_turns`: of a joint that friction follows the torque of.
+        Normal load, N; or the torque that the joint transmits, N m, if `load_turns`.
     turns, is_coefficient : bool
     speed_unit : str
-        As in the file.
+        Unit of the speeds in the file.
     notes : tuple of str
     load_turns : bool
     radius : float or None
-        Of the contact of what turns, m; None if it is not known.
+        Radius of the contact of a turning body, m; None if it is not known.
     questions : tuple of str
-        Those of the notes that doubt the numbers.
+        Notes that ask the user whether a number is right.
     """
 
     source: str
@@ -77,15 +77,15 @@ class SpeedTable:
 
 @dataclass(frozen=True)
 class PreslidingLoop:
-    """Force over displacement before sliding, in the order of measurement.
+    """Loop of force over displacement before sliding, in the order of measurement.
 
     Attributes
     ----------
     source : str
     displacement : ndarray (n,)
-        m, or rad where `turns`.
+        m, or rad if `turns`.
     force : ndarray (n,)
-        N, or N m where `turns`.
+        N, or N m if `turns`.
     turns : bool
     """
 
@@ -98,9 +98,9 @@ class PreslidingLoop:
 
 @dataclass(frozen=True)
 class _Role:
-    """A column that was found: its SI values, its unit, and the direction that its name says (0: none).
+    """Column with a known role: its values in SI units, its unit, and the direction that its name states (0: none).
 
-    `is_bare` is true if the unit is assumed.
+    `is_bare` is true if the file gives no unit, so that it was assumed.
     """
 
     values: Array
@@ -113,14 +113,14 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
     """Read a table of friction at constant speeds.
 
     Columns are found by their names and units: ``speed [mm/min]``, ``F (N)``, ``torque_Nm``, ``mu``, ``load [kN]``,
-    ``direction`` (words or signs; negative speeds are backward without it). Two columns of friction, ``forward [N]``
-    and ``backward [N]``, are read as two rows each.
+    ``direction`` (words or signs; without this column, negative speeds are backward). Where friction has two columns,
+    ``forward [N]`` and ``backward [N]``, each row of the file becomes two rows.
 
     Parameters
     ----------
     path : path
     load : float or str, optional
-        Constant load, N, if there is no column of it.
+        Constant load, N, if the file has no column for it.
     **columns
         Column or unit by role: ``speed="mm/min"``, ``force="F2"``, ``torque=("M", "N m")``.
 
@@ -140,7 +140,7 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
         both = f"has columns of {' and of '.join(kinds)}; leave one out" if len(kinds) > 1 else "has no column for it"
         names = _table(Path(path)).names
         if names == [str(place) for place in range(1, len(names) + 1)]:
-            raise _fault(source, lacking, "the file has no header, which tells what its columns are; write one as its "
+            raise _fault(source, lacking, "the file has no header to name its columns; write one as its "
                          "first line, such as: speed [mm/min], force [N]")  # fmt: skip
         raise _fault(source, lacking, f"{both}; a table of speeds has speed, force or torque or friction, and if known "
                      f"load and direction; its columns are {listed(map(repr, names))}")  # fmt: skip
@@ -159,7 +159,7 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
     pressed = np.tile(found["load"][0].values, len(rows)) if "load" in found else None
     twisted = pressed is not None and unit(found["load"][0].unit)[1] == unit("N m")[1]
     if twisted and not turns:
-        raise _fault(source, "load", f"got {found['load'][0].unit} beside a {kind}; allowed: a load in N, what presses")
+        raise _fault(source, "load", f"got {found['load'][0].unit} beside a {kind}; allowed: a normal load in N")
     if load is not None:
         pressed, twisted = np.full(len(v), checked_option("load", load, "N", source)), False
     elif pressed is None:
@@ -180,7 +180,7 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
             f"got {format_count(len(v), 'row')} of sliding; a table of speeds has {FEWEST_ROWS} at least",
         )
     unloaded: list[str] = []
-    if twisted and pressed is not None:  # which rubs by its size, also where it is zero
+    if twisted and pressed is not None:  # friction grows with the size of the torque, which may be zero
         pressed = np.abs(pressed)
         v, f, pressed, unloaded = _without_load(v, f, pressed)
         twisted = pressed is not None
@@ -196,27 +196,30 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
 
 
 def _without_load(speed: Array, torque: Array, load: Array) -> tuple[Array, Array, Array | None, list[str]]:
-    """Rows of the directions that have a load somewhere, and questions on the other; no load where neither has."""
+    """Speed, torque and load of each direction of motion in which the load is not always zero, and questions.
+
+    The questions are about the direction that is left out. The load is None if it is zero in both directions.
+    """
     if not np.any(load > 0):
         return speed, torque, None, []
     for side, way in ((1.0, "forward"), (-1.0, "backward")):
         rows = np.sign(speed) == side
         if np.any(rows) and not np.any(load[rows] > 0):
             question = (
-                f"{way}: {format_count(int(np.sum(rows)), 'row')} left out, as load 0 N m throughout tells no "
-                "coefficient: give the loads, or these rows as a table without the column"
+                f"{way}: {format_count(int(np.sum(rows)), 'row')} left out, as no coefficient follows from a load of "
+                "0 N m throughout: give the loads, or write these rows as a table without the column load"
             )
             return speed[~rows], torque[~rows], load[~rows], [question]
     return speed, torque, load, []
 
 
 def checked_option(name: str, value: Any, si_unit: str, source: str) -> float:
-    """A positive load or radius in SI units.
+    """Positive load or radius in SI units, from a number or text with a unit.
 
     Raises
     ------
     ParameterError
-        Naming the option.
+        If it is not positive or has another dimension; names the option.
     """
     try:
         return float(Parameter(si_unit, positive, name).checked(value))
@@ -228,7 +231,7 @@ def checked_option(name: str, value: Any, si_unit: str, source: str) -> float:
 
 
 def _signs(speed: Array, friction: Array, kind: str, direction: bool) -> list[str]:
-    """Notes on signs that are left out."""
+    """Notes on signs of speed or friction that are not used."""
     notes = []
     if np.all(speed < 0) and not direction:
         notes.append("all speeds are negative: the friction is that of backward motion")
@@ -241,7 +244,7 @@ def _signs(speed: Array, friction: Array, kind: str, direction: bool) -> list[st
 
 
 def table_from_arrays(arrays: Mapping[str, Any]) -> SpeedTable:
-    """Table of arrays in SI units by role: speed (m/s, or rad/s with torque), force, torque or friction, load.
+    """Table from arrays in SI units by role: speed (m/s, or rad/s with torque), force, torque or friction, load.
 
     Raises
     ------
@@ -251,13 +254,13 @@ def table_from_arrays(arrays: Mapping[str, Any]) -> SpeedTable:
     kinds = [role for role in ("force", "torque", "friction") if role in arrays]
     if "speed" not in arrays or len(kinds) != 1 or set(arrays) - {"speed", "load", *kinds}:
         raise _fault(
-            "arrays", "table", f"got {listed(arrays)}; allowed: speed, one of force, torque and friction, and load"
+            "arrays", "table", f"got {listed(arrays)}; allowed: speed, load, and one of force, torque and friction"
         )
     try:
         found = {role: np.atleast_1d(np.asarray(values, dtype=float)) for role, values in arrays.items()}
         v, f, *pressed = np.broadcast_arrays(*(found[role] for role in ("speed", kinds[0], "load") if role in found))
     except (TypeError, ValueError) as error:
-        raise _fault("arrays", "table", "allowed: numbers, as many of one column as of the other") from error
+        raise _fault("arrays", "table", "allowed: arrays of numbers that are equally long") from error
     turns = kinds[0] == "torque"
     every = np.stack([v, f, *pressed])
     if not np.all(np.isfinite(every)) or np.any(v == 0) or not all(np.all(one > 0) for one in pressed):
@@ -317,13 +320,13 @@ def _table(path: Path) -> Table:
 
 
 def _needed(head: str, own: str | None) -> str | None:
-    """Role of a column in a table of speeds or a loop; None of one that may be left out."""
+    """Role of a column in a table of speeds or a loop; None for a column that may hold anything."""
     role = role_of(head, own)
     return None if role == "displacement" and own is None else role
 
 
 def _refuse_misfits(path: Path, role: str = "") -> None:
-    """Refuse columns that are named like a speed, force, torque or load, or like one role, and have another unit."""
+    """Raise an error if the unit of a column contradicts its name: any speed, force, torque or load, or one `role`."""
     table = _table(path)
     heads = [split_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
     heads = [head if not role or role in roles_named(split_bracket(*head)[0]) else ("", None) for head in heads]
@@ -335,7 +338,10 @@ def _refuse_misfits(path: Path, role: str = "") -> None:
 def _roles(
     path: Path, given: Mapping[str, Any], without: Sequence[str] = ()
 ) -> tuple[dict[str, list[_Role]], list[str]]:
-    """Columns of a file by role but those `without`, and notes; of friction there may be two, forward and backward."""
+    """Columns of a file by role, except the roles `without`, and notes.
+
+    Force, torque or friction may have two columns: forward and backward.
+    """
     table = _table(path)
     heads = [split_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
     chosen = {role: _asked(str(path), role, value, table.names, heads) for role, value in given.items()}
@@ -365,7 +371,7 @@ def _roles(
             raise _fault(str(path), role, f"column {name!r} is in {stated}; expected a unit such as {wanted}")
         if dimension == unit("kg")[1]:
             factor *= WEIGHT
-            notes.append(f"load: kg press with {WEIGHT} N each")
+            notes.append(f"load: a mass; each kg presses with {WEIGHT} N")
         found.setdefault(role, []).append(_Role(table.values[i] * factor, stated, direction_of(head), is_bare))
     notes += [f"not used: column {name!r}" for name in unused]
     for role, several in found.items():
@@ -379,7 +385,7 @@ def _roles(
 def _asked(
     source: str, role: str, value: Any, names: Sequence[str], heads: Sequence[tuple[str, str | None]]
 ) -> tuple[int | None, str | None]:
-    """Column and unit of an option: either, or a pair of both."""
+    """Index of a column and its unit from an option, which is a column, a unit, or a pair of both."""
     stated = None
     if isinstance(value, (tuple, list)) and len(value) == 2:
         value, stated = value
@@ -399,14 +405,14 @@ def _asked(
 
 
 def _stacked(speed: Array, one: _Role, direction: list[_Role] | None) -> tuple[Array, Array]:
-    """Signed speed and friction of one column of friction."""
+    """Signed speeds (n,) and friction (n,) of one column of friction; the sign is that of its direction."""
     if direction is not None:
         return np.abs(speed) * np.where(direction[0].values > 0, 1.0, -1.0), one.values
     return (np.abs(speed) * one.side if one.side else speed), one.values
 
 
 def _unsigned(source: str, speed: Array, friction: Array, kind: str) -> Array:
-    """Friction without signs, which may be those of the speeds, of the pull, or none."""
+    """Size of friction (n,); its sign may follow the direction of the speeds or of the pull, or be always positive."""
     for side in (1.0, -1.0):
         own = friction[np.sign(speed) == side]
         if np.any(own == 0) or (len(own) and np.any(np.sign(own) != np.sign(own[0]))):

@@ -1,4 +1,7 @@
-"""Questions about a table of speeds whose numbers are not those of friction: exchanged columns, units, weights."""
+"""Questions to the user about a table of friction over speed whose numbers are implausible.
+
+They name the likely cause: exchanged columns, a wrong unit, or a constant load such as a weight.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +13,23 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.dimensions import unit
 from steadyslip.core.format import format_quantity
 
-FALLS, FALLS_POWER = 3.0, 3.0  # more than friction falls in a narrow table, and with which power of the speed in all
-STEEPEST = 20.0  # more than friction rises in a narrow table: drag rises with the square of speed at most
-SMALLEST, LARGEST = 3e-4, 3.0  # of friction coefficients: rolling guides 0.001 to 0.005, rubber 1 to 2
-USUAL = (0.003, 1.0)  # friction coefficients that another unit is asked about for
-FAST, FASTEST = 1.0, 10.0  # m/s: speeds without and with a unit that guides do not reach; brakes have up to 50
-UNEQUAL = 2.0  # times the friction of the other direction: of gears, screws and seals up to 1.5 are measured
-NEAR = 1.5  # factor between speeds of two directions that are compared
+FALLS, FALLS_POWER = 3.0, 3.0
+"""Largest plausible fall of friction with speed: this factor, or this power of the ratio of the speeds if larger."""
+STEEPEST = 20.0
+"""Largest plausible rise of friction with speed, as a factor; or the ratio of the speeds squared (drag) if larger."""
+SMALLEST, LARGEST = 3e-4, 3.0
+"""Plausible friction coefficients: rolling guides have 0.001 to 0.005, rubber has 1 to 2."""
+USUAL = (0.003, 1.0)  # another unit is suggested if it gives a friction coefficient between these
+FAST, FASTEST = 1.0, 10.0
+"""Speeds (m/s) that guides do not reach, for a column without a unit and for one with a unit; brakes reach 50."""
+UNEQUAL = 2.0  # largest plausible ratio of friction in the two directions; gears, screws and seals have up to 1.5
+NEAR = 1.5  # largest ratio of a forward and a backward speed at which friction is compared
 
 
 def questions_of_table(
     speed: Array, force: Array, load: Array | None, kind: str, units: dict[str, str | None]
 ) -> Iterator[str]:
-    """Questions about the rows of a table of speeds, one of one cause.
+    """Questions to the user about a table of friction over speed, one for each suspected cause.
 
     Parameters
     ----------
@@ -31,9 +38,9 @@ def questions_of_table(
     load : ndarray (n,) or None
         N; None if there is none, or if it is a torque.
     kind : str
-        force, torque or friction, which is a coefficient.
+        What `force` holds: "force", "torque" or "friction" (a coefficient).
     units : dict of str to str or None
-        Unit in the file by role; None of a column without one.
+        Unit in the file by role; None for a column without a unit.
     """
     per_load = np.abs(force) if load is None or kind != "force" else np.abs(force) / load
     if exchanged := list(_exchanged(np.abs(speed), per_load, kind)):
@@ -46,7 +53,7 @@ def questions_of_table(
 
 
 def _exchanged(speed: Array, friction: Array, kind: str) -> Iterator[str]:
-    """Friction that varies more with speed than anything that drags does."""
+    """Question whether two columns are exchanged, if friction varies too strongly with speed."""
     spread, varies = speed.max() / speed.min(), friction.max() / friction.min() if np.all(friction > 0) else 0.0
     rises = float(np.mean((np.log(speed) - np.log(speed).mean()) * np.log(np.maximum(friction, 1e-300)))) > 0
     if varies > (max(STEEPEST, spread**2) if rises else max(FALLS, spread**FALLS_POWER)):
@@ -57,7 +64,7 @@ def _exchanged(speed: Array, friction: Array, kind: str) -> Iterator[str]:
 
 
 def _fast(speed: Array, units: dict[str, str | None]) -> Iterator[str]:
-    """Speeds that no such test has."""
+    """Question about the unit of the speeds, if they are too high for a friction test."""
     fastest, own = speed.max(), units["speed"]
     if own is None and fastest >= FAST:
         told = format_quantity(float(fastest), "m/s")
@@ -71,7 +78,7 @@ def _fast(speed: Array, units: dict[str, str | None]) -> Iterator[str]:
 
 
 def _coefficients(typical: float, kind: str, units: dict[str, str | None]) -> Iterator[str]:
-    """Friction coefficients beyond all of slides, with the units in which they are usual."""
+    """Question about units, if the friction coefficient is implausible; suggests units that would make it usual."""
     if SMALLEST <= typical <= LARGEST:
         return
     meant = []
@@ -87,12 +94,12 @@ def _coefficients(typical: float, kind: str, units: dict[str, str | None]) -> It
                       if USUAL[0] < typical * ratio**power < USUAL[1]]  # fmt: skip
         if USUAL[0] < 1 / typical < USUAL[1]:
             meant.append(f"the columns of {kind} and load exchanged")
-    asked = f"is {' or '.join(meant)} meant?" if meant else "write the units that are meant in the header"
+    asked = f"is {' or '.join(meant)} meant?" if meant else "write the correct units in the header"
     yield f"{said} of {float(f'{typical:.2g}'):.7g}, where friction coefficients are 0.001 to 2: {asked}"
 
 
 def _unequal(speed: Array, force: Array, kind: str) -> Iterator[str]:
-    """Friction of two directions of which one is a multiple of the other, as where a weight hangs on it."""
+    """Question about a constant load, such as a weight, if friction differs too much between the two directions."""
     ahead, back = speed > 0, speed < 0
     pairs = [
         (a, b)
@@ -110,5 +117,5 @@ def _unequal(speed: Array, force: Array, kind: str) -> Iterator[str]:
         half = format_quantity(abs(there - here) / 2, si)
         yield (
             f"{kind} is {each[0]} forward and {each[1]} backward at like speeds: if a weight or another constant load "
-            f"is in it, take that off both; friction would be half their difference, {half}"
+            f"is in it, subtract that load from both; friction would be half their difference, {half}"
         )

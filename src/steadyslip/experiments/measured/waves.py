@@ -1,7 +1,8 @@
-"""Waves of a displacement sensor: errors that repeat with travel, as those of a scale, a screw or an encoder do.
+"""Removal of periodic errors of a displacement sensor, such as those of a scale, a screw or an encoder.
 
-Lines through such a displacement have wrong rates, and slips and changes that are none. The wave is a sine of the
-place, fitted together with the lines between changes of the rate, and taken out.
+The error is a sine wave of the position. Without correction, rates fitted to the displacement are wrong, and slips and
+changes of the rate are found where there are none. The wave is fitted together with straight lines between the changes
+of the rate, and subtracted.
 """
 
 from __future__ import annotations
@@ -19,24 +20,24 @@ from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.measured.record import Record, frozen
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise
 
-GRID = 4096  # places of equal distance at which deviations are looked at for a wave: 10 a period of the shortest
+GRID = 4096  # equally spaced positions for the search of a wave: 10 for each period of the shortest
 FEWEST_PERIODS, MOST_PERIODS = 3, GRID // 10
-LEAST_SHARE = 0.2  # of the variance of deviations from lines that one wave has; of noise with memory .9 it has .01
-WANDERS = 1.3  # times its noise from sample to sample by which a displacement strays, from which a wave is looked for
-MANY_SLIPS = 3  # slips and glitches of the sensor from which it is looked for too
-ROUNDS = 2  # of wave and lines in turn: lines without the wave have their changes where these are
-TURNS = 12  # of a place in terms of itself; each takes a share 2 pi amplitude / period of the error of the last
-STEPS = 20  # of a fit that starts from a linear one: a wave that is there takes 2 to 4, one that is not hundreds
-OUTLIER = 4.0  # standard deviations beyond which a sample counts for nothing
+LEAST_SHARE = 0.2  # least share of a wave in the variance about the lines; in noise of correlation 0.9 it is 0.01
+WANDERS = 1.3  # a wave is looked for if deviations from the lines exceed this multiple of the sample-to-sample noise
+MANY_SLIPS = 3  # a wave is also looked for if this many slips and glitches were found
+ROUNDS = 2  # fits of wave and lines in turn: changes of the rate are located better once the wave is removed
+TURNS = 12  # fixed-point iterations for the position; each reduces its error to 2 pi amplitude / period of the last
+STEPS = 20  # evaluations of a fit that starts from a linear one: a real wave takes 2 to 4, noise takes hundreds
+OUTLIER = 4.0  # samples are ignored beyond this many standard deviations
 AFTER, SETTLED = 0.05, 6.0
-"""Share of a run, and lags of its servo, that its first samples last, in which the load point may still follow."""
-LEAST_GAIN = 0.8  # share of the strays, or of the slips and glitches, that is left where a wave was there
-LEAST_SIZE = 10.0  # amplitude in its standard errors, for white noise
+"""Start of a run that is ignored, as the servo may still be settling: share of the run, and multiple of its lag."""
+LEAST_GAIN = 0.8  # deviations, or slips and glitches, must fall below this share when the wave is removed
+LEAST_SIZE = 10.0  # least amplitude in standard errors, computed for white noise
 WAVE = "was taken out of the displacement"
 
 
 def without_wave(record: Record) -> Record:
-    """Record whose displacement has no wave that repeats with travel, with a note; itself where there is none."""
+    """Record without the periodic error of its displacement sensor, with a note; `record` itself if it has none."""
     load, moved = record.loading.load, record.displacement
     if load is None or moved is None or record.integrated or load.curve is not None or len(record) < 2 * FEWEST_PERIODS:
         return record
@@ -69,9 +70,9 @@ def without_wave(record: Record) -> Record:
 
 
 def _lines(time: Array, course: Course) -> tuple[Array, Array]:
-    """Columns (n, k) of a line for each run between changes, and mask of its samples, some after each change left out.
+    """Regressors (n, k) of a straight line for each run between changes of the rate, and mask (n,) of samples to fit.
 
-    How the load point follows a change is not known before the wave is.
+    Samples just after each change are masked: how the load point follows a change is only known without the wave.
     """
     ends = np.array([time[0], *(change.time for change in course.changes), time[-1]])
     keep = np.ones(len(time), dtype=bool)
@@ -87,7 +88,7 @@ def _lines(time: Array, course: Course) -> tuple[Array, Array]:
 
 
 def _periods(time: Array, moved: Array, course: Course) -> float | None:
-    """Periods over all travel of the strongest wave in the deviations from lines; None if none is strong."""
+    """Number of periods in the travel, for the strongest wave in the deviations from lines; None if none is strong."""
     lines, keep = _lines(time, course)
     moved, lines = moved[keep], lines[keep]
     left = moved - lines @ np.linalg.lstsq(lines, moved)[0]
@@ -107,9 +108,9 @@ def _periods(time: Array, moved: Array, course: Course) -> float | None:
 
 
 def _fitted(time: Array, moved: Array, course: Course, start: Array) -> tuple[Array, Array, float] | None:
-    """Fit of a wave (parts with sine and cosine, m; period, m): parameters, place (n,), standard error of a part.
+    """Fit of a wave: parameters (sine and cosine amplitude, period; m), position (n,), standard error of an amplitude.
 
-    None where its period wanders off, as it does where there is no wave.
+    None if the fit does not converge, as happens if there is no wave.
     """
     lines, keep = _lines(time, course)
 
@@ -134,7 +135,7 @@ def _fitted(time: Array, moved: Array, course: Course, start: Array) -> tuple[Ar
 
 
 def _place(moved: Array, parts: Array) -> Array:
-    """Place (n,) of the load point, of which the sensor shows place and wave."""
+    """Position (n,) of the load point: the measured displacement without the wave, by fixed-point iteration."""
     sine, cosine, period = parts
     place = moved
     for _ in range(TURNS):
@@ -144,7 +145,7 @@ def _place(moved: Array, parts: Array) -> Array:
 
 
 def _place_slopes(place: Array, parts: Array) -> Array:
-    """Derivatives (n, 3) of the place by sine, cosine and period of the wave that is in what the sensor shows."""
+    """Derivatives (n, 3) of the position by the sine amplitude, the cosine amplitude and the period of the wave."""
     sine, cosine, period = parts
     angle = 2 * np.pi / period * place
     own, other = np.sin(angle), np.cos(angle)
@@ -154,12 +155,12 @@ def _place_slopes(place: Array, parts: Array) -> Array:
 
 
 def _beside(values: Array, base: Array) -> Array:
-    """What of `values` (n, ...) the orthonormal columns of `base` (n, k) do not have."""
+    """Part of `values` (n, ...) that is orthogonal to the orthonormal columns of `base` (n, k)."""
     return np.asarray(values - base @ (base.T @ values))
 
 
 def _first(time: Array, moved: Array, course: Course, count: float) -> Array:
-    """Parts and period of a wave near `count` periods over all travel, from a linear fit together with lines."""
+    """Amplitudes and period of a wave with about `count` periods in the travel, from a linear fit with the lines."""
     lines, keep = _lines(time, course)
 
     def fit(count: float) -> tuple[float, Array]:

@@ -1,4 +1,4 @@
-"""Words in the cells of a table of speeds: directions become 1 and -1, columns of remarks and dates are left out."""
+"""Replacement of words in a table of speeds: directions become 1 and -1; columns of remarks or dates are left out."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ FORWARD = r"forward|forwards|fwd|fw|vor|vorwärts|hin|positive|pos|cw|\+"
 BACKWARD = r"backward|backwards|bwd|back|bw|reverse|rück|rückwärts|zurück|negative|neg|ccw|[-−–]"
 _DIRECTION = re.compile(rf"(?i)(?<![^\s,;|\t\"])(?:{FORWARD}|{BACKWARD})(?![^\s,;|\t\"])")
 _DASHES = ("-", "−", "–")
-"""A direction in a column of them, no value in others."""
+"""Cells that mean backward in a column of directions, and no value in other columns."""
 _DIRECTIONS = "forward and backward, vor and zurück, + and -, 1 and -1"
 
 
 def without_words(raw: bytes, role_of: Callable[[str], str | None]) -> tuple[bytes, list[str]]:
-    """Text of a table whose cells are numbers or missing, and notes on columns that are left out.
+    """Text of a table with words replaced by numbers or empty cells, and notes on columns that are left out.
 
     Parameters
     ----------
     raw : bytes
     role_of : callable
-        Role of a column by its name; None for one that is not needed.
+        Function from the name of a column to its role; None if the column is not needed.
 
     Raises
     ------
     ParameterError
-        If a column that is needed holds words.
+        If a needed column holds words other than directions.
     """
     if len(raw) > LARGE:  # a table of speeds has a few rows
         return raw, []

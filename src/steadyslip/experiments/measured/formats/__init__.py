@@ -1,6 +1,7 @@
-"""Readers of files with measured columns, chosen by the ending of the name; columns are not interpreted.
+"""Readers of files with measured columns, chosen by the ending of the file name; columns are not interpreted.
 
-Each format is one module with one function from a path to a `Table`; to add one, add a line to `FORMATS`.
+Each format is one module with a function ``read(path, table)`` that returns a `Table`; a new one needs a line in
+`FORMATS`.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ __all__ = ["FORMATS", "Table", "read_columns"]
 MOST_BINARY = 2**31  # bytes of a file; `MOST_VALUES` doubles have 2^28
 SHORT_TEXT = 2**20  # bytes of a text that is read without a separate process: its size bounds time and memory
 SECONDS, BYTES_A_SECOND, MOST_SECONDS = 10.0, 2**20, 85.0
-"""CPU time to read a file (s): fixed part, bytes per further second, and bound. The slowest, a workbook, takes half."""
+"""CPU time allowed to read a file (s): fixed part, bytes per further second, upper limit. Workbooks take half of it."""
 MOST_SAID = 300  # characters of another library's message that are quoted
 FORMATS = {
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("HDF5", "hdf5")),
@@ -32,13 +33,13 @@ FORMATS = {
     **dict.fromkeys((".xlsx", ".xlsm"), ("Excel workbook", "workbook")),
     ".tdms": ("TDMS", "tdms"),
 }
-"""Name and module of each format; other files are text, or XLOOK's, which are recognised by their content."""
+"""Name and module of each format by ending; other files are text or XLOOK files, which are told apart by content."""
 
 
 def read_columns(path: Path, table: str | None = None, skip_bad_lines: bool = False) -> Table:
-    """Read a file by its ending; text if the ending is unknown.
+    """Columns of a file in the format of its ending; text if the ending is unknown.
 
-    Formats of other libraries and long texts are read in a separate process with limits on time and memory.
+    Formats that need another library, and long texts, are read in a separate process with limits on time and memory.
 
     Raises
     ------
@@ -62,7 +63,7 @@ def read_columns(path: Path, table: str | None = None, skip_bad_lines: bool = Fa
 
 
 def read_here(name: str, table: str | None, skip_bad_lines: bool) -> tuple[dict[str, Any], list[Array]]:
-    """Read a file in this process: names, units and notes as dict, values and line numbers as arrays."""
+    """Columns of a file, read in this process: names, units and notes as dict, values and line numbers as arrays."""
     path = Path(name)
     ending = path.suffix.lower()
     found = _by_library(path, table, *FORMATS[ending]) if ending in FORMATS else read_text(path, skip_bad_lines)

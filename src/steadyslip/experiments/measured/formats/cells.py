@@ -18,7 +18,7 @@ MISSING = {
     "#div/0!", "#value!", "#ref!", "#num!", "#name?", "#null!", "*", "**", "***", "?", ".",
     "1.#qnan", "1.#inf", "-1.#ind",
 }  # fmt: skip
-"""Texts of cells without a number."""
+"""Texts of cells (in lower case) that stand for a missing number."""
 
 POINT, COMMA = ".", ","
 _GROUPED = {
@@ -58,7 +58,7 @@ def _float(text: str) -> float | None:
 
 
 def number_with_any_mark(cell: str) -> float | None:
-    """Number in a cell with either decimal mark; None if it is none."""
+    """Number in a cell with either decimal mark; None if the cell holds other text."""
     found = number(cell, POINT)
     return number(cell, COMMA) if found is None else found
 

@@ -134,7 +134,7 @@ def _of_version_73(path: Path) -> dict[str, Any]:
 
 
 def _from_hdf5(item: Any, deep: int, left: ReadCount) -> Any:
-    """HDF5 object as MATLAB had it; its matrices are stored transposed."""
+    """Value of an HDF5 object as in MATLAB, as dicts, lists, strings and arrays; HDF5 stores matrices transposed."""
     import h5py
 
     from steadyslip.experiments.measured.formats.hdf5 import member, numbers_in
@@ -165,7 +165,7 @@ def _from_hdf5(item: Any, deep: int, left: ReadCount) -> Any:
 
 
 def _parts(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Pairs (name, value) of a variable and everything in it that can be named."""
+    """Pairs (name, value) for a variable and for every member that can be addressed by a name."""
     yield name, value
     if isinstance(value, Mapping):
         for field, one in value.items():
@@ -205,7 +205,7 @@ def _channels(value: Any) -> Numbers | None:
 
 
 def _with_header(numeric: Numbers, inside: dict[str, Any]) -> Numbers:
-    """Columns of the only matrix named by the only list of as many words, as `importdata` writes them."""
+    """Columns of the only matrix, named by the only list of as many words, as MATLAB's `importdata` writes them."""
     matrices = [name for name, (value, _) in numeric.items() if value.ndim == 2]
     if len(matrices) != 1:
         return numeric
@@ -224,6 +224,6 @@ def _words(value: Any) -> list[str]:
 
 
 def _shortened(found: Numbers) -> Numbers:
-    """Names without their structures, if they stay different."""
+    """Columns with the structures dropped from their names, if the names stay different."""
     short = [name.rpartition(".")[2] for name in found]
     return dict(zip(short, found.values(), strict=True)) if len(set(short)) == len(short) else found

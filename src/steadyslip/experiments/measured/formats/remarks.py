@@ -12,7 +12,7 @@ _WORD = re.compile(r"[^\W\d_]{2,}|[*=#~-]{2,}|\x1a|\x00")
 
 
 def harmless_lines(body: Sequence[Line], header: Sequence[Line], bad: set[int]) -> tuple[set[int], list[str]]:
-    """Bad lines that are no damage (repeated headers, remarks at the end), and notes on them.
+    """Numbers of the bad lines that are no damage (repeated headers, remarks at the end), and notes on them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Numbers of a file as named columns, and limits on their size."""
+"""Table of named columns that was read from a file, and limits on its size."""
 
 from __future__ import annotations
 
@@ -15,18 +15,17 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.measured.columns import known_unit, listed
 from steadyslip.experiments.measured.formats.cells import seconds_since_first
 
-LENGTH_TOLERANCE = (
-    0.03  # relative difference in length of columns that an interrupted acquisition leaves; chosen by trial
-)
+LENGTH_TOLERANCE = 0.03
+"""Relative difference in length of columns that counts as an interrupted acquisition; chosen by trial."""
 MOST_VALUES, MOST_ROWS = 40_000_000, 10_000_000
-"""Most numbers of a file and of a column: with the copies that cleaning makes, they fit into a gigabyte."""
+"""Most numbers in a file and in a column: with the copies made by cleaning, they fit into a gigabyte."""
 FEW_VALUES, VALUES_A_BYTE = 2**20, 16
-"""Numbers that any file may have, plus this many per byte: even noise takes a byte per number, however compressed."""
+"""Numbers that any file may have, plus this many for each of its bytes: measured noise takes a byte per number."""
 
 
 @dataclass
 class Table:
-    """Numbers of a file, as columns.
+    """Named columns of a file.
 
     Attributes
     ----------
@@ -64,7 +63,7 @@ def check_size(path: Path, size: int, remedy: str = "", rows: int = 0) -> None:
     held = path.stat().st_size
     if size > FEW_VALUES + VALUES_A_BYTE * held:
         raise NotAvailable(
-            f"{str(path)!r} states {size} numbers in {held} bytes, which no measurement packs so{remedy}"
+            f"{str(path)!r} claims to hold {size} numbers in {held} bytes, too few bytes for measured numbers{remedy}"
         )
 
 
@@ -91,7 +90,7 @@ def check_ambiguous_names(path: Path, found: Sequence[str], kind: str) -> None:
 
 
 def chosen_part(path: Path, kind: str, table: str | None, parts: Sequence[str]) -> str | None:
-    """Return the part of a file that is asked for; None for the whole file.
+    """Part of a file that the option `table` names; None for the whole file.
 
     Raises
     ------
@@ -140,7 +139,7 @@ def from_vectors(path: Path, found: Mapping[str, tuple[Any, str | None]], notes:
 
 
 def names_and_units(lines: Sequence[Sequence[str]], count: int) -> tuple[list[str], list[str | None]]:
-    """Names and units of columns from the lines above the numbers; numbers as names if there are none."""
+    """Names and units of columns from the lines above the numbers; the names are 1, 2, 3 … if there are none."""
     if not lines:
         return [str(i) for i in range(1, count + 1)], [None] * count
     rows = [([*cells], _as_units(cells)) for cells in lines]

@@ -37,8 +37,9 @@ def read(path: Path, table: str | None) -> Table:
 
 
 def _of_a_record(path: Path, own: dict[str, list[Any]]) -> tuple[list[str], list[str]]:
-    """Groups that make a record: all, if their channels are alike in length and differ in name; else one with
-    friction.
+    """Groups that make a record, and notes.
+
+    They are all groups, if their channels are equally long and have different names; else the only one with friction.
     """
     if len(own) <= 1:
         return list(own), []

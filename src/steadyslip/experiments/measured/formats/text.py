@@ -30,8 +30,9 @@ from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook, 
 from steadyslip.files.inputs import read_bytes
 
 SHOWN = 8  # damaged lines listed in a message
-HEADER_LINES = 500  # lines in which the end of a header is looked for with the lines below; chosen by trial
-MOST_HEADER, NAMED = 20_000, 500  # lines in which numbers begin; lines above them that may name columns
+HEADER_LINES = 500  # the header ends at two lines of numbers if they are among the first so many; chosen by trial
+MOST_HEADER, NAMED = 20_000, 500
+"""Most lines above the first numbers; most lines directly above the numbers that may name columns."""
 MOST_TEXT = 2**30  # bytes of a file
 MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines parsed in Python (a minute of CPU time); characters of a line
 OTHER_FORMATS = {
@@ -42,7 +43,7 @@ OTHER_FORMATS = {
 }
 """First bytes of other formats, and advice."""
 UTF16 = (b"\xff\xfe", b"\xfe\xff")  # first bytes of UTF-16 text, such as Excel's "Unicode text"
-LARGE, SAMPLE_BYTES = 2**20, 2**17  # bytes above which NumPy is tried first; bytes from which it learns the columns
+LARGE, SAMPLE_BYTES = 2**20, 2**17  # bytes above which NumPy is tried first; bytes that its layout is taken from
 _BEGINS_WITH_NUMBER = re.compile(r"[\s|\"',;]*[-+\u2212]?[.,]?\d")
 _QUOTED = re.compile(r'"[^"]*"')
 _SPLIT_THOUSANDS = re.compile(r"(^|,)[-+]?\d{1,3},\d{3}(\.\d*)?(,|$)")
@@ -50,12 +51,14 @@ _BREAKS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 
 
 def read_text(path: Path, skip_bad_lines: bool, mended: Callable[[bytes], bytes] = bytes) -> Table:
-    """Columns of a text file, or of an XLOOK file, which has no ending of its own; `mended` may replace words first.
+    """Columns of a text file, or of an XLOOK file, whose name may have any ending.
+
+    The function `mended` may replace words in the raw text before it is parsed.
 
     Raises
     ------
     NotAvailable
-        If it is neither.
+        If the file is neither text nor of XLOOK.
     ParameterError
         If lines are damaged.
     """
@@ -77,8 +80,8 @@ def read_text(path: Path, skip_bad_lines: bool, mended: Callable[[bytes], bytes]
     if longest is None or longest > MOST_LINE:
         which = f"lines of more than {MOST_LINE} characters" if longest else f"more than {MOST_LINES} lines"
         raise NotAvailable(
-            f"{str(path)!r} has {which} and is not plain columns of numbers throughout; mend it, or give it as HDF5 or "
-            "Parquet"
+            f"{str(path)!r} has {which} and is not plain columns of numbers throughout; correct it, or give it as HDF5 "
+            "or Parquet"
         )
     if text.startswith(BEGIN):
         return read_labview(text, path)
@@ -91,7 +94,7 @@ def read_text(path: Path, skip_bad_lines: bool, mended: Callable[[bytes], bytes]
         _count_all_moments(table, layout)
     if faults and not skip_bad_lines:
         rest = [Problem("file", f"... and {len(faults) - SHOWN} more such lines")] if len(faults) > SHOWN else []
-        advice = Problem("file", "mend these lines, or leave them out with skip_bad_lines (--skip-bad-lines)")
+        advice = Problem("file", "correct these lines, or leave them out with skip_bad_lines (--skip-bad-lines)")
         raise ParameterError([*faults[:SHOWN], *rest, advice], title=str(path))
     if faults:
         shown = ", ".join(str(f.line) for f in faults[:SHOWN])
@@ -301,14 +304,14 @@ def _usual_count(header: list[Line], body: list[Line], delimiter: str | None) ->
 def _names(
     header: list[Line], comments: list[Line], first: int, delimiter: str | None, count: int
 ) -> tuple[list[str], list[str | None]]:
-    """Names and units of the columns from the header or from comments; numbers as names without both."""
+    """Names and units of the columns from the header or from comments; without both, the names are 1, 2, 3 …"""
     lines = [line for _, line in header] or [line for i, line in comments if i < first]
     split = [cells for line in lines[-NAMED:] if len(cells := header_cells(line, delimiter, count)) == count]
     return names_and_units(split, count)
 
 
 def header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
-    """Cells of a header line, whose separator may differ from the body's; none for a ruled line."""
+    """Cells of a header line, which may have another separator than the body; empty if it does not have `count`."""
     if delimiter == "|":
         line = line.strip().strip("|")
     if not re.search(r"[^-=+|:\s]", line):
@@ -324,7 +327,7 @@ def header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
 
 
 def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], list[str]]:
-    """All numbers (columns, rows), their line numbers, damaged lines, and notes."""
+    """Numbers (columns, rows), the line of each row, problems of damaged lines, and notes."""
     count = len(layout.names)
     lines, table, faults = [], [], []
     for line_number, line in layout.body:
@@ -358,7 +361,7 @@ def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], 
 
 
 def _row(cells: list[str], marks: list[str], names: list[str]) -> tuple[list[float], str | None]:
-    """Numbers of a line, and a description of the first fault or None."""
+    """Numbers of a line, and a message on its first fault (None if there is none)."""
     if COMMA not in marks:
         try:
             return [float(cell) for cell in cells], None

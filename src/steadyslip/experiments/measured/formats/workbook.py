@@ -1,6 +1,6 @@
-"""Reader of Excel workbooks: cells (Office Open XML, ECMA-376), read row by row within limits, as columns.
+"""Reader of Excel workbooks (Office Open XML, ECMA-376): cells are read row by row within limits on their number.
 
-openpyxl is used for the meaning of number formats only; it takes ten times as long per cell.
+openpyxl only interprets number formats; reading cells with it takes ten times as long.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ from steadyslip.experiments.measured.formats.cells import (
 from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, count_moments, names_and_units
 from steadyslip.files.apart import more_time
 
-MOST_PACKED, FEW_BYTES = 60, 2**23  # allowed compression of a part, beyond a harmless size; numbers reach 20
-SOME = 2**16  # numbers per second of CPU time allowed; reading takes half of it
+MOST_PACKED, FEW_BYTES = 60, 2**23
+"""Largest compression ratio of a part (sheets of numbers reach 20); smaller parts than so many bytes may have any."""
+SOME = 2**16  # numbers for which one more second of CPU time is allowed; reading them takes half of it
 MOST_PARTS, MOST_SHEET, MOST_OTHER = 10_000, 2**31, 2**28  # parts of an archive; bytes of a sheet; of any other part
 MOST_COLUMNS = 1000  # of a sheet that are read; chosen by trial
 FORMULA = "="
@@ -40,7 +41,7 @@ FORMULA = "="
 MOMENT, DATE, CLOCK, SPAN = 1, 2, 3, 4
 """Kinds of numbers that are times: date and time of day, date alone, time of day, duration."""
 EPOCHS = {False: 25_569, True: 24_107}  # day number of 1970-01-01: counted from 1900 or, on old Macintoshes, 1904
-TICKS = 5  # decimals of a second that a date keeps as a number of days in double precision
+TICKS = 5  # decimals of a second to which a date is rounded: a number of days in double precision keeps no more
 
 
 @dataclass
@@ -50,7 +51,7 @@ class SheetCells:
     Attributes
     ----------
     lines : ndarray of int (rows)
-        Row number on the sheet of each non-empty row.
+        Number on the sheet (from 1) of each non-empty row.
     rows, columns, numbers, kinds : ndarray (cells)
         Index in `lines`, column (from 0), value and kind of time (0: none) of each number; times in seconds.
     text_rows, text_columns : ndarray of int (texts)
@@ -67,12 +68,12 @@ class SheetCells:
     texts: list[str]
 
     def counts(self, more: Array) -> Array:
-        """Count of numbers per column, plus the count of each column in `more`."""
+        """Count of numbers in each column; each column index in `more` counts as one further number."""
         width = 1 + max((int(np.max(one)) for one in (self.columns, self.text_columns) if len(one)), default=-1)
         return np.bincount(self.columns, minlength=width) + np.bincount(more, minlength=width)
 
     def places(self, row: int) -> list[int]:
-        """Columns with content in a row."""
+        """Indices of the columns with content in a row."""
         own = (self.columns[self.rows == row], self.text_columns[self.text_rows == row])
         return [int(k) for one in own for k in one]
 
@@ -107,7 +108,7 @@ class SheetCells:
 
 
 class Workbook:
-    """Open workbook.
+    """Workbook that is open for reading.
 
     Attributes
     ----------
@@ -232,7 +233,7 @@ class Workbook:
         about = self._archive.getinfo(part)
         if about.file_size > min(most, FEW_BYTES + MOST_PACKED * about.compress_size):
             size = f"{about.file_size} bytes from {about.compress_size}"
-            raise NotAvailable(f"{str(self._path)!r}: {part} unpacks to {size}, which no table of measurements does")
+            raise NotAvailable(f"{str(self._path)!r}: {part} unpacks to {size}, too much for a table of measurements")
         ends = tuple(f"}}{name}" for name in names)
         with self._archive.open(part) as stream:
             for _, element in iterparse(stream):
@@ -257,7 +258,7 @@ Stated = list[float | None]
 
 
 def read(path: Path, table: str | None) -> Table:
-    """Table of the named sheet; by default of the only one with a record, or with any numbers."""
+    """Table of the named sheet; by default of the only sheet with a record, or else with any numbers."""
     with Workbook(path) as book:
         part = chosen_part(path, "sheet", table, list(book.sheets))
         names = list(book.sheets) if part is None else [part]
@@ -272,7 +273,7 @@ def read(path: Path, table: str | None) -> Table:
 
 
 def _table(path: Path, sheet: SheetCells) -> Table | None:
-    """Record on a sheet; None if there is none."""
+    """Table of the columns on a sheet; None if it has no row with two numbers."""
     known = {text: _parsed(text) for text in set(sheet.texts)}
     stated = [known[text] for text in sheet.texts]
     sheet, stated, dropped = _without_side_tables(sheet, stated)
@@ -326,7 +327,7 @@ def _check_formulas(path: Path, names: list[str], values: Array, texts: list[lis
 
 
 def _without_side_tables(sheet: SheetCells, stated: Stated) -> tuple[SheetCells, Stated, list[int]]:
-    """Sheet without columns that have few numbers beside a record, their parsed texts, and the removed columns."""
+    """Sheet without its sparse columns, the numbers in its remaining texts, and the removed columns with numbers."""
     is_number = [value is not None or text == FORMULA for value, text in zip(stated, sheet.texts, strict=True)]
     counts = sheet.counts(sheet.text_columns[np.array(is_number, dtype=bool)])
     few = np.flatnonzero(counts < SPARSE * max(counts, default=0))
@@ -355,7 +356,7 @@ def _finite(stated: Stated) -> Array:
 
 
 def _text_above(above: list[list[str]], place: int) -> str:
-    """Text above an empty header cell, which was merged with it."""
+    """Lowest text above an empty header cell, with which the cell was merged."""
     return next((cells[place] for cells in reversed(above) if cells[place]), "")
 
 

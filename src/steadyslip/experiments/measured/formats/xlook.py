@@ -1,12 +1,12 @@
-"""Reader of files of XLOOK, with which many rock-friction laboratories process their records: binary, or as text.
+"""Reader of XLOOK files, binary or text; many rock-friction laboratories process their records with XLOOK.
 
-A header of 36 bytes (name, numbers of records and columns, two settings), 32 channel descriptions of 84 bytes (name,
-unit, gain, comment, number of elements), then the columns one after another, as floats of four or eight bytes. Until
-2007 there were 16 channels. Headers are big-endian, as were the machines on which XLOOK ran,
-but for files of versions compiled elsewhere; the byte order of columns is the one that gives plausible numbers.
+A binary file has a header of 36 bytes (name, numbers of records and columns, two settings), then 32 channel
+descriptions of 84 bytes (name, unit, gain, comment, number of elements), or 16 until 2007, then the columns one after
+another, as floats of four or eight bytes. Headers are usually big-endian; some versions of XLOOK wrote little-endian
+ones. The byte order of the columns is the order that gives plausible numbers.
 
-Texts have lines of column numbers, names, units and numbers of records above the numbers, whose first column, without a
-name, counts rows.
+A text file has lines of column numbers, names, units and numbers of records above the numbers. The first column has no
+name and counts rows.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ UNUSED = "no_val"
 TEXT_HEAD = re.compile(
     rb"\s*number of records[^\n]*\n(?:\s*col\b[^\n]*\n)?([^\n]*)\n([^\n]*)\n((?:\s*\d+ recs\b[^\n]*\n)?)", re.IGNORECASE
 )
-"""Head of a text: names, units, and numbers of records."""
+"""Lines above the numbers of a text file: names, units, and numbers of records."""
 NUMBER_KINDS = (">f4", ">f8", "<f4", "<f8")
 
 
 def with_plain_head(raw: bytes) -> bytes:
-    """Text of XLOOK with names and units only above the numbers, the column that counts rows among them.
+    """Text of an XLOOK file with its head replaced by one line of names and one of units, for all columns.
 
-    Anything else is returned as it is. Lines keep their numbers.
+    Other content is returned unchanged. Line numbers do not change.
     """
     found = TEXT_HEAD.match(raw[:MOST_HEAD])
     if found is None:
@@ -55,7 +55,7 @@ def is_xlook(raw: bytes) -> bool:
 
 
 def _described(raw: bytes) -> tuple[int, int, int] | None:
-    """Channels, rows and columns of a file of any size with descriptions of channels; None if it has none."""
+    """Numbers of channels, rows and columns from the header of an XLOOK file of any size; None for other files."""
     for channels in dict.fromkeys(channels for channels, _ in LAYOUTS):
         heads = [raw[k : k + 26] for k in range(HEAD, HEAD + channels * CHANNEL, CHANNEL)]
         fields = [_text(part) for head in heads for part in (head[:13], head[13:])]
@@ -69,7 +69,7 @@ def _described(raw: bytes) -> tuple[int, int, int] | None:
 
 
 def _size(raw: bytes) -> tuple[int, int, int, int] | None:
-    """Channels, rows, columns and bytes per number; None if it is no XLOOK file."""
+    """Numbers of channels, rows and columns, and bytes per number; None if they do not match the size of the file."""
     if len(raw) <= HEAD:
         return None
     for order in (">", "<"):
@@ -82,12 +82,12 @@ def _size(raw: bytes) -> tuple[int, int, int, int] | None:
 
 
 def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Array]:
-    """Names, units and values (columns, rows) of a file's bytes.
+    """Names, units and values (columns, rows) from the bytes of an XLOOK file.
 
     Raises
     ------
     NotAvailable
-        If its sizes do not match, or its columns are not numbers.
+        If the size of the file does not match its header, or its columns are not numbers.
     """
     size = _size(raw)
     if size is None:
@@ -95,7 +95,7 @@ def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Ar
         here = len(raw) - HEAD - channels * CHANNEL
         raise NotAvailable(
             f"{source!r} is a damaged XLOOK file: its header says {rows} rows of {columns} columns, "
-            f"{4 * rows * columns} or {8 * rows * columns} bytes, and it has {here}; copy it anew, as a binary file"
+            f"{4 * rows * columns} or {8 * rows * columns} bytes, and it has {here}; copy it again, as a binary file"
         )
     channels, rows, columns, width = size
     body = HEAD + channels * CHANNEL

@@ -2,10 +2,11 @@
 
 import pytest
 
+import lab_records as lab
 import slow_states_at_random as campaign
 import steadyslip as ss
 from steadyslip.experiments.fitting import remedies
-from steadyslip.experiments.fitting.words import warnings
+from steadyslip.experiments.fitting.words import slip_after_changes, warnings
 
 
 @pytest.mark.parametrize(("what", "gains"), [("states", True), ("trend", False)])
@@ -36,6 +37,14 @@ def test_a_state_that_fits_as_well_as_a_trend_leaves_a_less_b_open(monkeypatch):
         assert ("these data do not determine a - b" in said) is is_open
         assert ("fits as well (BIC +5.9), with a - b 0.012 in place of" in said) is is_open
         assert any(own.name == "a - b" for own in fit.derived) is not is_open
+
+
+def test_the_range_of_slip_that_a_less_b_is_of_is_printed():
+    """The load point moves at 5 um/s for 89.87 s after its change."""
+    fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300))
+    assert slip_after_changes(fit) == pytest.approx(5e-6 * 89.87, rel=0.01)
+    assert "range           at most 450 um of slip after a change of rate; a - b is without" in str(fit)
+    assert "a - b are those over at most 450 um of slip" in ss.experiments.step_table(fit).methods
 
 
 def test_a_choice_is_listed_once():

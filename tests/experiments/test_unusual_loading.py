@@ -116,6 +116,8 @@ def test_a_fit_says_that_it_cannot_show_a_servo():
     assert "cannot show how a servo follows" in " ".join(told[True].split())
     assert "behind a spring of 1" in " ".join(told[True].split())
     assert "cannot show" not in told[False]
+    little = " ".join(str(ss.fit(ss.lab_rig(), measured(2e10, 2e-8, 0.1))).split())
+    assert "by little, as behind a part of the press 10 times as stiff as the whole, or by chance" in little
 
 
 def test_rounding_of_a_displacement_is_no_spring():

@@ -111,7 +111,7 @@ def outcome(one: Drawn) -> tuple[float, float, float, str]:
     fit = ss.fit(ss.lab_rig(one.law), one.record)
     seconds = time.process_time() - begun
     text, true = " ".join(str(fit).split()), one.rig.value("slider.stiffness")
-    named = "across" if "as across the fault" in text else ""
+    named = "across" if "as across the fault" in text else "part" if "a part of the press" in text else ""
     place, found = fit.names.index("slider.stiffness"), fit.values["slider.stiffness"]
     z = fit_deviation(fit, place, true) if fit.estimates[place].determined else np.nan
     return found / true, z, seconds, named

@@ -25,7 +25,7 @@ from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import Progress
 from steadyslip.experiments.fitting.settings import STARTS
-from steadyslip.experiments.fitting.words import warnings
+from steadyslip.experiments.fitting.words import slip_after_changes, warnings
 from steadyslip.experiments.loading.pressing import LoadStep
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.noise import STRUCTURE
@@ -252,6 +252,9 @@ class StepTable(Displayed):
             "A constant was added to friction." if plan.offset else "",
             "Friction was free to come later or earlier than the loading." if plan.lag else "",
             "How far records begin from steady sliding was fitted." if plan.initial == "free" else "",
+            f"Values of a - b are those over at most {format_quantity(slip, 'm', 2)} of slip after a change of rate."
+            if (slip := slip_after_changes(self.joint))
+            else "",
             "Later steps begin with friction and state as the step before left them, with its errors."
             if any(one.plan.beginnings for one in self.steps)
             else "",

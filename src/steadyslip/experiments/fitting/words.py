@@ -85,8 +85,31 @@ def _quality(fit: FitNumbers) -> list[str]:
         *quality(fit),
         *_weights(fit),
         *textwrap.wrap(f"driven by       {drive_line(fit)}", WIDTH, subsequent_indent=" " * 16),
+        *_range_of_weakening(fit),
         in_words(residual_checks(fit)),
     ]
+
+
+def _range_of_weakening(fit: FitNumbers) -> list[str]:
+    """Line on the slip after changes of rate, beyond which a record says nothing of a - b; none without an a - b."""
+    slip = slip_after_changes(fit)
+    if not slip or all(one.name.partition("@")[0] != WEAKENING for one in fit.derived):
+        return []
+    slipped = format_quantity(slip, "m", 2)
+    return [f"range           at most {slipped} of slip after a change of rate; a - b is without what needs more"]
+
+
+def slip_after_changes(fit: FitNumbers) -> float:
+    """Longest displacement (m) of a load point between a change of its rate and the next or the end; 0 without one.
+
+    A state with a longer slip distance hardly evolves in the records, so that a - b of the fit is without it.
+    """
+    longest = 0.0
+    for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
+        if loading.load is not None and loading.load.changes:
+            times = [*(change.time for change in loading.load.changes), float(record.time[-1])]
+            longest = max(longest, *np.diff(loading.load.integral(np.asarray(times))))
+    return longest
 
 
 def _weights(fit: FitNumbers) -> list[str]:

@@ -142,6 +142,17 @@ def test_help_and_analyze_stay_light():
     assert done.stdout.splitlines()[-1] == "[]", done.stdout
 
 
+def test_no_object_is_left_to_the_last_garbage_collection():
+    code = (
+        "import atexit, gc\n"
+        "atexit.register(lambda: print(len(gc.get_objects())))\n"
+        "from steadyslip.cli import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, "--version"], capture_output=True, text=True, check=True)
+    assert int(done.stdout.splitlines()[-1]) < 1000  # importing the commands alone makes tens of thousands
+
+
 STICK_SLIP = EXAMPLE.parent / "stick-slip.toml"
 
 

@@ -6,6 +6,7 @@ steadyslip, 130 interrupted (after printing what is complete), 141 standard outp
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import warnings
@@ -27,7 +28,9 @@ def end(command: Callable[[], object]) -> None:
         sys.exit(print_message("there is no standard output to write the answer to", 2))
     with warnings.catch_warnings():
         warnings.showwarning = partial(_show_warning, warnings.showwarning)
-        sys.exit(status_of(command))
+        status = status_of(command)
+    gc.freeze()  # spares the garbage collections of the ending interpreter, a fifth of the time of a verdict
+    sys.exit(status)
 
 
 def status_of(command: Callable[[], object]) -> int:

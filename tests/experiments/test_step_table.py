@@ -96,7 +96,7 @@ def test_warnings_are_notes_below_the_printed_table(tmp_path):
     assert "tell them only together" in below
     assert "%" not in below.replace(r"\%", "")
     assert "Values in parentheses are not determined" in table.methods
-    assert "Notes to the table say of what these fits warn" in table.methods
+    assert "Notes to the table give the warnings of these fits" in table.methods
     table.to_csv(tmp_path / "t.csv")
     rows = [*csv.DictReader((tmp_path / "t.csv").read_text().splitlines())]
     assert told[0] in rows[1]["warnings"]

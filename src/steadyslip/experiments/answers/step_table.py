@@ -1,21 +1,22 @@
-"""Table of a paper: every step of the records fitted alone, then all together; with a sentence on how."""
+"""Table for a paper: fits of every step of the records alone and of all together, with text for the methods section."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
 from steadyslip.core.format import enumerated, format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
+from steadyslip.experiments.answers.latex import cell, symbol, tabular, unit_head, value_with_error
+from steadyslip.experiments.answers.methods import methods_text
 from steadyslip.experiments.fitting.beginning import Beginning
 from steadyslip.experiments.fitting.derived import DERIVED
 from steadyslip.experiments.fitting.estimates import Estimate
@@ -25,43 +26,27 @@ from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import Progress
 from steadyslip.experiments.fitting.settings import STARTS
-from steadyslip.experiments.fitting.words import slip_after_changes, warnings
+from steadyslip.experiments.fitting.words import warnings
 from steadyslip.experiments.loading.pressing import LoadStep
 from steadyslip.experiments.measured.record import Record
-from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.files.output import write_columns, write_text
 from steadyslip.machine.slider import Slider
 
-SHOWN = {"displacement": "mm", "m": "um", "m/s": "um/s", "Pa": "MPa", "Pa/m": "GPa/m"}
-"""Units of the table in LaTeX, by name of a column or SI unit; others stay as they are."""
 ABOUT = {"record": "", "step": "", "time": "s", "displacement": "m", "rate before": "m/s", "rate after": "m/s",
          "normal stress": "Pa", "samples": "", "rms": "1"}  # fmt: skip
 """Columns before those of the estimates, with SI units."""
-DRIVEN = {
-    "measured": "the measured loading",
-    "protocol": "the given protocol",
-    "smoothed": "a smooth curve through the measured displacement",
-}
-"""What drives the model, by `drive` of a fit, where it is not found in the record."""
 PRINTED, LABEL = 120, 20  # characters of a line of a printed table, and of a file's name in it
-PLAIN = ("velocity step", "normal-stress step", "hold")  # kinds of steps that a printed change tells by its units
-TIME = 7  # figures of times: steps are at some ten thousand seconds of a record, known to a tenth
-TYPESET = {one: f"\\{one}" for one in "_%&#$"} | {
-    "±": r"$\pm$", "−": "$-$", "×": r"$\times$", "²": "$^2$", "<": "$<$", ">": "$>$",
-    "α": r"$\alpha$", "μ": r"$\mu$", "σ": r"$\sigma$", "Σ": r"$\Sigma$", "Θ": r"$\Theta$", "τ": r"$\tau$",
-}  # fmt: skip
-"""Characters that LaTeX takes for something else or does not have."""
-GREEK = ("alpha", "beta", "gamma", "eta", "mu", "psi", "sigma", "tau", "theta")
+PLAIN = ("velocity step", "normal-stress step", "hold")  # kinds of steps not named in print: units make them clear
 
 
 @dataclass(frozen=True)
 class FittedStep:
-    """One line of a table: a step of a record, and the fit to the part of the record around it.
+    """Line of a table: a step of a record, and the fit to the part of the record around it.
 
     Attributes
     ----------
     record : str
-        Where the record comes from.
+        Source of the record, such as the name of its file.
     step : LoadStep or None
         None for the fit to all records together.
     fit : Fit
@@ -80,7 +65,7 @@ class FittedStep:
     rates: tuple[float | None, float | None] = (None, None)
 
     def about(self) -> dict[str, Any]:
-        """Values of the columns `ABOUT`; None where there is none."""
+        """Values by name of the columns `ABOUT`; None if a line has no value."""
         step = self.step
         kind = "all together" if step is None else step.kind
         kind += f" to {format_quantity(step.after, 'Pa')}" if step is not None and step.unit == "Pa" else ""
@@ -89,7 +74,7 @@ class FittedStep:
         return dict(zip(ABOUT, values, strict=True))
 
     def label(self) -> str:
-        """Name of the line in a printed table: file, time and change of the step; where too long, its end."""
+        """Label of the line in a printed table: file name (its end, if it is long), time and change of the step."""
         if self.step is None:
             return "all together"
         when = str(self.step)
@@ -99,17 +84,23 @@ class FittedStep:
         return f"{name if len(name) <= LABEL else '...' + name[3 - LABEL :]}, {when}"
 
     def verdict(self, notes: list[str]) -> str:
-        """Whether friction weakens with velocity, by a − b and its interval, and numbers of what the fit warns of."""
+        """Text "weakens" or "strengthens" with velocity, by a − b and its interval, and the numbers of its warnings.
+
+        Parameters
+        ----------
+        notes : list of str
+            Warnings of the whole table, which are numbered in this order.
+        """
         numbers = ",".join(str(1 + notes.index(text)) for text in warnings(self.fit))
         found = next((one for one in self.fit.derived if one.name.startswith("a - ")), None)
         if found is None:
             return f"[{numbers}]" if numbers else ""
         sure = found.determined and not found.low <= 0 <= found.high
-        said = ("strengthens" if found.value > 0 else "weakens") if sure else "not told"
+        said = ("strengthens" if found.value > 0 else "weakens") if sure else "undecided"
         return f"{said} [{numbers}]" if numbers else said
 
     def estimates(self) -> dict[str, Estimate]:
-        """Estimates of the rig's parameters and what follows from them, by name."""
+        """Estimates by name: fitted parameters of the rig and quantities derived from them, such as a − b."""
         rig = [one for one in self.fit.estimates if one.name.partition("@")[0] in self.fit.plan.free]
         stiff = self.fit.plan.rig.of_kind("stiffness")
         bare = [f"k{one.name.removeprefix(own)}" if (own := one.name.partition("@")[0]) in stiff
@@ -124,7 +115,7 @@ class StepTable(Displayed):
     Attributes
     ----------
     lines : tuple of FittedStep
-        One for each step, in order of records and time; the last is of all together.
+        One for each step, in order of records and time; the last line is the fit to all records together.
     left_out : tuple of str
         Sentences on steps that could not be fitted alone.
     """
@@ -143,17 +134,17 @@ class StepTable(Displayed):
         return tuple(line.fit for line in self.lines[:-1])
 
     def _estimated(self) -> dict[str, str]:
-        """Names of the estimates of any line, with SI units, in order of columns.
+        """SI units of all estimates by name, in the order of the columns.
 
-        a − b is read first; then come parameters of the law, stiffnesses, the level of friction, and what every record
-        has to itself.
+        a − b comes first, then parameters of the law, stiffnesses, the level of friction, and parameters that differ
+        between records.
         """
         found = {name: one.unit for line in self.lines for name, one in line.estimates().items()}
         level = self.joint.plan.rig.of_kind("friction level")
         return {name: found[name] for name in sorted(found, key=lambda name: _place(name, level))}
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units."""
+        """Convert to a dict of JSON-ready data in SI units."""
         lines = []
         for line in self.lines:
             own = {name: {"value": one.value, "error": one.error if one.determined else None, "unit": one.unit}
@@ -162,9 +153,9 @@ class StepTable(Displayed):
         return {"lines": lines, "left_out": list(self.left_out), "methods": self.methods}
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the table as CSV, SI units in the header, the warnings of each line last.
+        """Write the table as CSV with SI units in the header; the last column holds the warnings of each line.
 
-        An error is empty where a value is not determined.
+        The error of a value that is not determined is an empty cell.
 
         Raises
         ------
@@ -183,36 +174,26 @@ class StepTable(Displayed):
         write_columns(path, columns, "%.8g")
 
     def latex_text(self) -> str:
-        r"""Table as LaTeX: a ``tabular``, with the sentences for the methods section as a comment above it.
+        r"""Table as LaTeX: a ``tabular`` with the sentences of `methods` as a comment above it.
 
-        Values in parentheses are not determined. Numbers at steps are those of the notes below, of what the fits warn.
+        Values in parentheses are not determined. Raised numbers at a step refer to `notes`, which are below the table.
         """
-        names = self._estimated()
+        names, notes, rig = self._estimated(), self.notes, self.joint.plan.rig
         about = {name: si for name, si in ABOUT.items() if name != "samples"}
-        heads = [name + (f" ({_unit(si, name)})" if si not in ("", "1") else "") for name, si in about.items()]
-        heads += [
-            f"${_letter(name, self.joint.plan.rig)}$" + (f" ({_unit(si)})" if si != "1" else "")
-            for name, si in names.items()
-        ]
-        rows, notes = [], self.notes
+        heads = [name + unit_head(si, name) for name, si in about.items()]
+        heads += [f"${symbol(name, rig)}${unit_head(si)}" for name, si in names.items()]
+        rows = []
         for line in self.lines:
             own, here = line.estimates(), line.about()
-            cells = [_cell(here[name], _shown(si, name), TIME if si == "s" else 4) for name, si in about.items()]
-            told = ",".join(str(1 + notes.index(text)) for text in warnings(line.fit))
-            cells[1] += f"$^{{{told}}}$" if told else ""
-            cells += [_with_error(own.get(name)) for name in names]
-            rows.append(" & ".join(cells) + r" \\")
-        body = [f"% {self.methods}", rf"\begin{{tabular}}{{ll{'r' * (len(heads) - 2)}}}", r"\hline",
-                " & ".join(heads) + r" \\", r"\hline", *rows[:-1], r"\hline", rows[-1], r"\hline",
-                r"\end{tabular}"]  # fmt: skip
-        if notes:
-            below = [rf"$^{{{k}}}$ {_escaped(text)}." for k, text in enumerate(notes, start=1)]
-            body += [r"\par\smallskip\noindent{\footnotesize", *below, r"\par}"]
-        return "\n".join(body) + "\n"
+            cells = [cell(here[name], si, name) for name, si in about.items()]
+            raised = ",".join(str(1 + notes.index(text)) for text in warnings(line.fit))
+            cells[1] += f"$^{{{raised}}}$" if raised else ""
+            rows.append(cells + [value_with_error(own.get(name)) for name in names])
+        return tabular(heads, rows, notes, self.methods)
 
     @property
     def notes(self) -> list[str]:
-        """What the fits of any lines warn of, each once."""
+        """Distinct warnings of the fits of all lines."""
         return list(dict.fromkeys(text for line in self.lines for text in warnings(line.fit)))
 
     def to_latex(self, path: str | PathLike[str]) -> None:
@@ -228,64 +209,11 @@ class StepTable(Displayed):
     @property
     def methods(self) -> str:
         """Sentences for the methods section of a paper."""
-        plan, line, law = self.joint.plan, self.lines[-1], self.joint.plan.rig.friction
-        driven = DRIVEN.get(plan.drive, "the commanded loading found in the load point's displacement")
-        states, evolution = len(getattr(law, "states", ()) or (law,)), getattr(law, "evolution", None)
-        kind = f"{law.name} friction"
-        if evolution is not None:
-            kind += f", {evolution.name} law, {states} state{'s' * (states > 1)}"
-        parts = (getattr(law, item.name) for item in fields(law))
-        memories = [one.name for one in parts if one is not evolution and hasattr(one, "name")]
-        kind += "" if law.forgets_stress() else "".join(f", {name} memory of normal stress" for name in memories)
-        free = [name for name, one in line.estimates().items() if one not in self.joint.derived]
-        changes = [one for loading in plan.loading if loading.load for one in loading.load.changes]
-        late = [one for one in changes if one.lag]
-        further = [
-            f"The load point was taken to follow changes of its rate late, as a servo of second order does (by "
-            f"{format_quantity(late[0].lag, 's')} in the end)."
-            if late
-            else "",
-            "Around changes of its rate the load point was taken to move as measured, in straight pieces of the rate."
-            if any(one.pieces for one in changes)
-            else "",
-            f"A polynomial of order {plan.trend} in {plan.trend_axis} was added to friction." if plan.trend else "",
-            "A constant was added to friction." if plan.offset else "",
-            "Friction was free to come later or earlier than the loading." if plan.lag else "",
-            "How far records begin from steady sliding was fitted." if plan.initial == "free" else "",
-            f"Values of a - b are those over at most {format_quantity(slip, 'm', 2)} of slip after a change of rate."
-            if (slip := slip_after_changes(self.joint))
-            else "",
-            "Later steps begin with friction and state as the step before left them, with its errors."
-            if any(one.plan.beginnings for one in self.steps)
-            else "",
-            f"Outliers weighed less ({plan.loss} loss)." if plan.loss != "linear" else "",
-            ""
-            if plan.weights is None
-            else "Samples were weighted."
-            if any(np.ptp(row) > 0 for row in plan.weights)
-            else "Records weigh by their noise.",
-        ]
-        left = sum(one.whiteness.p < STRUCTURE for one in (*self.steps, self.joint))
-        open_ones = any(not one.determined for line in self.lines for one in line.estimates().values())
-        said = [
-            f"Residuals of {left} of these {len(self.lines)} fits have structure (probability of their whiteness below "
-            f"{STRUCTURE:g})."
-            if left
-            else "",
-            "Values in parentheses are not determined by the data." if open_ones else "",
-            "Notes to the table say of what these fits warn." if self.notes else "",
-        ]
-        noise = "allowing for correlated residuals" if self.joint.correlated else "for independent residuals"
-        alone = f"{len(self.steps)} step{'s were' if len(self.steps) != 1 else ' was'} fitted alone"
-        added = "".join(f" {text}" for text in further if text)
-        return (
-            f"Friction was fitted by least squares with steadyslip {self.joint.version}: {kind}, coupled to a spring "
-            f"and driven by {driven}, with {', '.join(free)} free.{added} {alone}, and all together; errors are one "
-            f"standard deviation, {noise}." + "".join(f" {text}" for text in said if text)
-        )
+        fits = (*self.steps, self.joint)
+        return methods_text(fits, [line.estimates() for line in self.lines], bool(self.notes))
 
     def _rows(self) -> tuple[list[list[str]], list[str]]:
-        """Rows of the printed table, its head first, and names of estimates that do not fit beside each other."""
+        """Rows of the printed table, the first with names, and names of the estimates for which a line is too short."""
         notes, level = self.notes, self.joint.plan.rig.of_kind("friction level")
         own = [line.estimates() for line in self.lines]
         verdicts = [line.verdict(notes) for line in self.lines]
@@ -321,17 +249,18 @@ class StepTable(Displayed):
 def step_table(
     fit: Fit, *, starts: int = STARTS, effort: float = 1.0, progress: Progress | None = None
 ) -> StepTable:  # fmt: skip
-    """Fit every step of a fit's records alone, with the rig and options of the fit.
+    """Table of fits to every step of a fit's records alone, with the rig and options of the fit.
 
-    The part of a step goes from halfway since the step before to the next step. Later steps begin with friction and
-    state as the step before left them, with its errors (as all together did, where it does not determine everything).
+    The part of a step begins halfway between it and the step before, and ends at the next step. Friction and state at
+    the beginning of a part follow from the fit to the step before, with its errors; or from the fit to all records, if
+    the step before does not determine all parameters.
 
     Parameters
     ----------
     fit : Fit
-        To all records together; its line is the last.
+        Fit to all records together, which becomes the last line.
     starts, effort
-        As for `fit`, of each step.
+        As for `fit`, for each step.
     progress : callable, optional
         As for `fit`.
 
@@ -365,7 +294,7 @@ def step_table(
             rig, free = (plan.rig, plan.free) if part.stress_changes else _without_memory(fit, i)
             try:
                 own = options | {"weights": weights}
-                if part.time[0] > record.time[0]:  # then friction may still change since the step before
+                if part.time[0] > record.time[0]:  # friction may still be changing after the step before
                     own |= _begun(before or (fit, i), make_plan(rig, part, free, **own))
                 alone = search_fit(rig, part, free, progress=progress, **own)
                 before = (alone, 0) if all(one.determined for one in alone.estimates) else None
@@ -382,7 +311,10 @@ def step_table(
 
 
 def _without_memory(fit: Fit, record: int) -> tuple[Slider, tuple[str, ...]]:
-    """Rig with a memory of normal stress as fitted to all records, and what else is free: for a step without effect."""
+    """Rig with the memory of normal stress held as fitted to all records, and names of the other free parameters.
+
+    It serves a step at constant normal stress, on which the memory has no effect.
+    """
     plan = fit.plan
     fields_of = tuple(f"friction.{name}." for name in plan.rig.friction.decided_by_stress)
     held = [n for n in plan.free if n.startswith(fields_of) or n in plan.rig.of_kind("stress share")]
@@ -410,7 +342,15 @@ def _beginning_of(record: Record, step: LoadStep) -> float:
 
 
 def _begun(before: tuple[Fit, int], plan: Plan) -> dict[str, Any]:
-    """Option of a fit that tells how its record begins: as a fit of what came before, of its record i, leaves it."""
+    """Options of a fit for the beginning of its record.
+
+    Parameters
+    ----------
+    before : tuple of Fit and int
+        A fit whose record, of this index, contains the beginning: friction, state and their errors follow from it.
+    plan : Plan
+        Plan of the new fit.
+    """
     fit, i = before
     if plan.rests(0) or not (fit.plan.follows and fit.search.converged):
         return {"initial": "free"}
@@ -449,62 +389,12 @@ def _fitted_step(record: Record, step: LoadStep, alone: Fit) -> FittedStep:
 
 
 def _place(name: str, level: Sequence[str]) -> tuple[bool, int]:
-    """Place of an estimate among the columns; `level` are names of the level of friction in the rig."""
+    """Sort key of an estimate among the columns; `level` holds the rig's parameters that set the level of friction."""
     bare = name.partition("@")[0]
     stiffness = bare == "k" or bare in DERIVED
     return bare != name, 0 if bare == "a - b" else 3 if f"friction.{bare}" in level else 2 if stiffness else 1
 
 
 def _value(one: Estimate) -> str:
-    """Value and error with units; a value that is not determined in parentheses."""
+    """Value and error with units as text; a value that is not determined is in parentheses."""
     return one.shown() if one.determined else f"({format_quantity(one.value, one.unit, area=one.area)})"
-
-
-def _shown(si: str, column: str = "") -> str:
-    """Unit of a column in LaTeX."""
-    return SHOWN.get(column, SHOWN.get(si, si))
-
-
-def _unit(si: str, column: str = "") -> str:
-    return _shown(si, column).replace("um", r"\textmu m")
-
-
-def _letter(name: str, rig: Slider) -> str:
-    """Name of an estimate in the mathematics of LaTeX; ``b`` of the second state is b_2."""
-    *before, last = name.split(".")
-    declared = next((one.role.letter for full, one in rig.parameters().items() if full.endswith(f".{name}")), "")
-    words = (part.split("_") for part in (declared or last).split("/"))
-    number = [part for part in before if part.isdigit()]
-    found = []
-    for head, *tail in words:
-        below = ",".join([*tail, *number])
-        found.append((f"\\{head}" if head in GREEK else head) + (f"_{{{below}}}" if below else ""))
-    return " / ".join(found)
-
-
-def _cell(value: Any, shown: str, digits: int) -> str:
-    """Text or number (SI) of a cell, in the unit shown."""
-    if value is None:
-        return "--"
-    if isinstance(value, str):
-        return _escaped(value)
-    return format_quantity(value / unit(shown)[0], "1", digits)
-
-
-def _escaped(text: str) -> str:
-    """Text in LaTeX."""
-    return "".join(TYPESET.get(one, one) for one in text)
-
-
-def _with_error(one: Estimate | None) -> str:
-    """Value and error in the units of the table, rounded to two digits of the error."""
-    if one is None:
-        return "--"
-    factor = unit(_shown(one.unit))[0]
-    value, error = one.value / factor, one.error / factor
-    if not one.determined:
-        return f"({value:.3g})"
-    if not error > 0:
-        return f"${value:.4g}$"
-    digits = max(1 - int(np.floor(np.log10(error))), 0)
-    return rf"${value:.{digits}f} \pm {error:.{digits}f}$"

@@ -250,7 +250,7 @@ def test_conditions_by_label_and_the_same_record_twice(fits):
     assert "  run 3  temperature 150\n" in str(by_label)
     assert by_label.to_dict()["conditions"]["temperature"] == given
     with pytest.raises(
-        ss.ParameterError, match=r"temperature: got those of run 1; allowed: one of each of run 1, run 2"
+        ss.ParameterError, match=r"temperature: got values for run 1; allowed: one for each of run 1, run 2"
     ):
         ss.population(fits, ["a"], conditions={"temperature": {"run 1": 20.0}})
     with pytest.raises(ss.ParameterError, match=r"fits\.again: has the record of run 1 again \(synthetic\)"):
@@ -297,7 +297,7 @@ def test_a_level_of_friction_that_the_population_lacks_is_the_rigs(fits):
     rock = ss.population(fits, ["a", "b", "d_c"], count=100)
     found = ss.predict(lab.rig(mu_ref=0.7), rock)
     assert found.rig.value("friction.mu_ref") == 0.7
-    assert "not in the population   friction.mu_ref = 0.7, of the rig" in str(found)
+    assert "not in the population   friction.mu_ref = 0.7, taken from the rig" in str(found)
     whole = ss.population(fits, ["a", "b", "d_c", "mu_ref"], count=100)
     assert "not in the population" not in str(ss.predict(lab.rig(mu_ref=0.7), whole))
 
@@ -401,7 +401,7 @@ def test_a_condition_in_a_file_by_the_names_of_records(files):
         ('condition = "T"\nvalues = [1, 2]', "population: got 3 records; allowed: 4 or more"),
         (
             'condition = "T"\nvalues = {p1 = 1, p2 = 2, q = 3}',
-            "population.values: got those of p1, p2, q; allowed: one of each of p1, p2, p3",
+            "population.values: got values for p1, p2, q; allowed: one for each of p1, p2, p3",
         ),
         ('condition = "T"\nvalues = {p1 = "hot"}', "population.values: "),
         ("draws = 5", "population.draws: got 5; allowed: a whole number from 100"),

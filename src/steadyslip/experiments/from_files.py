@@ -131,7 +131,7 @@ def population_files(
         labels.append(stem if stem not in labels else f"{stem} ({len(labels) + 1})")
     given = members.values
     if isinstance(given, dict) and set(given) != set(labels):
-        message = f"got those of {', '.join(given)}; allowed: one of each of {', '.join(labels)}"
+        message = f"got values for {', '.join(given)}; allowed: one for each of {', '.join(labels)}"
         raise ParameterError([Problem("population.values", message)])
     records = records_of(plan, paths, skip_bad_lines)
     needed = FEWEST + (members.condition is not None)

@@ -1,4 +1,4 @@
-"""Convert draws to ArviZ; the only module that imports the package."""
+"""Conversion of draws to the data types of ArviZ, which only this module imports."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from steadyslip.core.errors import NotAvailable
 
 @dataclass(frozen=True)
 class SampleDraws:
-    """What belongs to the samples of the records, by name of a column; draws are one chain after another.
+    """Measured samples of the records, with their likelihood and prediction by m draws, by name of a column.
 
     Attributes
     ----------
@@ -21,7 +21,8 @@ class SampleDraws:
         s.
     observed : dict of str to ndarray (n,)
     log_likelihood, predicted : dict of str to ndarray (m, n)
-        Logarithm of the probability density of each sample given those before it, and samples drawn anew.
+        Logarithm of the probability density of each sample given those before it, and simulated samples with noise;
+        draws of one chain follow those of another.
     """
 
     times: dict[str, Array]
@@ -30,7 +31,7 @@ class SampleDraws:
     predicted: dict[str, Array]
 
 
-MEMBERS = "experiment"  # the dimension of what every experiment has
+MEMBERS = "experiment"  # name of the dimension of quantities that each experiment has
 
 
 def inference_data(
@@ -57,7 +58,7 @@ def inference_data(
     members : sequence of str, optional
         Labels of the experiments.
     samples : SampleDraws, optional
-        What belongs to the samples of the records.
+        Likelihood and prediction of the samples of the records.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def inference_data(
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FutureWarning)  # about versions of its own to come
+            warnings.simplefilter("ignore", FutureWarning)  # ArviZ announces later versions of itself
             import arviz
     except ImportError as error:
         raise NotAvailable("this needs the package arviz; install steadyslip[lab]") from error
@@ -86,7 +87,7 @@ def inference_data(
             shape["dims"][name] = [f"{name}.time"]
             shape["coords"][f"{name}.time"] = time
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "More chains", UserWarning)  # walkers are many, and meant to be
+        warnings.filterwarnings("ignore", "More chains", UserWarning)  # there are many short chains on purpose
         known = hasattr(arviz, "InferenceData")
         found = arviz.from_dict(**groups, **shape) if known else arviz.from_dict(groups, **shape)
     for name, unit in units.items():

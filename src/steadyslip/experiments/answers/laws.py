@@ -1,4 +1,4 @@
-"""Compare friction laws by fits to the same records, information criteria and cross-validation."""
+"""Comparison of friction laws by fits to the same records, with information criteria and cross-validation."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
 WIDTH = 100  # characters of a line of text
-SCREENING_EFFORT = 0.1  # share of the effort for each law; the full effort is for those that may be the best
+SCREENING_EFFORT = 0.1  # share of the effort for a first fit of each law; laws that may be the best get the full effort
 MAX_SSQ_RATIO = 2.0  # laws above this multiple of the least sum of squares cannot become the best by a longer search
 MIN_SHOWN_RATIO = 2.0  # ratio of sums of squares above which text gives the ratio, below the percentage
 
@@ -52,8 +52,8 @@ class LawComparison(Displayed):
     refused : tuple of str
         Labels of models that cannot follow the records from any start.
     predicted : dict of str to float
-        Root mean square error of predicting samples that were left out, see `cross_validate`, by label; only of models
-        near the best, and empty unless computed.
+        Root mean square error in the prediction of samples that were left out (see `cross_validate`), by label, for
+        models near the best; empty unless computed.
     """
 
     fits: dict[str, Fit]
@@ -71,8 +71,8 @@ class LawComparison(Displayed):
     def best(self) -> str:
         """Label of the model with the least BIC, which penalises additional parameters.
 
-        One that is ahead by taking what the records leave open to be none (a memory of normal stress) comes behind the
-        next that frees it.
+        A model that is ahead only because it assumes that there is no memory of normal stress, which the records leave
+        open, comes behind the next model in which this memory is free.
         """
         return next(iter(self.fits))
 
@@ -117,19 +117,19 @@ class LawComparison(Displayed):
         )
         if taken := _taken_as_none(next_best) & set(own.names):
             return (
-                f"'{best}' it is, though the records do not tell {enumerated(sorted(taken))}: '{other}' has {less} and "
-                f"is {abs(ahead):.1f} {'behind' if ahead > 0 else 'ahead'} in BIC, and takes that to be none; "
-                f"{_agreement(own, next_best)}."
+                f"'{best}' is the best, though the records do not determine {enumerated(sorted(taken))}: '{other}', "
+                f"which lacks {'it' if len(taken) == 1 else 'them'}, has {less} and is {abs(ahead):.1f} "
+                f"{'behind' if ahead > 0 else 'ahead'} in BIC; {_agreement(own, next_best)}."
             )
         if ahead < STRONG_EVIDENCE:
             return (
-                f"The records hardly tell '{best}' from '{other}', which has {less} and is {ahead:.1f} behind in BIC; "
-                f"{_agreement(own, next_best)}."
+                f"The records hardly distinguish '{best}' from '{other}', which has {less} and is {ahead:.1f} behind "
+                f"in BIC; {_agreement(own, next_best)}."
             )
-        return f"'{best}' it is: '{other}', the next, has {less} and is {ahead:.1f} behind in BIC."
+        return f"'{best}' is the best: '{other}', the next, has {less} and is {ahead:.1f} behind in BIC."
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw each law's difference from the best.
+        """Plot the difference of each law from the best.
 
         Returns
         -------
@@ -139,12 +139,12 @@ class LawComparison(Displayed):
 
 
 def _taken_as_none(one: Fit) -> set[str]:
-    """Parameters that a fit lacks and that would change what it has, so that they leave it open."""
+    """Names of parameters that a fit lacks although they would affect it, such as a memory of normal stress."""
     return {name for own in one.unidentified for name in own.weights} - set(one.names)
 
 
 def _agreement(one: Fit, other: Fit) -> str:
-    """Clause on the numbers on which two fits agree: both are determined, and each is in the other's interval."""
+    """Clause on the numbers on which two fits agree: both determine them, each within the interval of the other."""
     both = {own.name for own in (*one.estimates, *one.derived)}
     pairs = [(one[e.name], e) for e in (*other.estimates, *other.derived) if e.name in both and e.unit != "s"]
     agreed = [a.name for a, b in pairs if a.determined and b.determined and a.low <= b.value <= a.high
@@ -156,9 +156,9 @@ def _agreement(one: Fit, other: Fit) -> str:
 
 @checked()
 def compare(fits: Mapping[str, Fit]) -> LawComparison:
-    """Compare fits to the same records by information criteria.
+    """Comparison of fits to the same records by information criteria.
 
-    Samples count by the number of independent ones, which the residuals of the fit with the least sum of squares give
+    The number of independent samples is estimated from the residuals of the fit with the least sum of squares and used
     for all fits: a model that leaves more structure in its residuals must not profit from it.
 
     Parameters
@@ -178,8 +178,8 @@ def compare(fits: Mapping[str, Fit]) -> LawComparison:
     model     parameters  sum of squares   AIC    BIC  weight
     slip               6     1.56072e-05   0.0    0.0   0.500
     the same           6     1.56072e-05   0.0    0.0   0.500
-    The records hardly tell 'slip' from 'the same', which has a sum of squares +0.00% and is 0.0 behind
-    in BIC; they agree on all numbers that both have.
+    The records hardly distinguish 'slip' from 'the same', which has a sum of squares +0.00% and is 0.0
+    behind in BIC; they agree on all numbers that both have.
     """
     if len(fits) < 2:
         raise ParameterError([Problem("fits", f"got {len(fits)}; allowed: two or more")])
@@ -193,7 +193,7 @@ def _in_order(fits: Mapping[str, Fit]) -> LawComparison:
             np.array_equal(a.friction, b.friction) for a, b in zip(one.plan.records, first.plan.records, strict=True)
         )
         if not same:
-            raise ParameterError([Problem(label, "is a fit to other records; allowed: the same")])
+            raise ParameterError([Problem(label, "is a fit to other records; allowed: fits to the same records")])
     best = min(fits.values(), key=lambda f: f.ssq)
     criteria = {label: one.criteria(best.noise) for label, one in fits.items()}
     order = sorted(fits, key=lambda label: criteria[label][1])
@@ -207,27 +207,27 @@ def _in_order(fits: Mapping[str, Fit]) -> LawComparison:
 def compare_laws(
     rig: Slider, records: Record | Sequence[Record], laws: Sequence[str] | None = None, **options: Any
 ) -> LawComparison:
-    """Fit several rate-and-state laws to the same records.
+    """Comparison of fits of several rate-and-state laws to the same records.
 
     Parameters
     ----------
     rig : Slider
-        Whose friction law names alternatives: rate-and-state friction every evolution law without parameters of its
-        own, with one state or two, and every memory of normal stress. Everything else is kept.
+        Rig with rate-and-state friction. Alternatives to its law have another evolution law, one or two states, or
+        another memory of normal stress; everything else is kept.
     records : Record or sequence of Record
     laws : sequence of str, optional
-        Their labels, such as ``aging``, ``slip, two states``, ``aging, linker-dieterich`` or ``prakash-clifton``; what
-        a label does not say is that of the rig. A few usual ones unless given; of records in which the normal stress
-        changes, with every memory of it.
+        Labels of laws, such as ``aging``, ``slip, two states``, ``aging, linker-dieterich`` or ``prakash-clifton``. A
+        label changes the law of the rig only in what it names. By default a few usual laws; if the normal stress
+        changes in the records, with each memory of normal stress.
     **options
-        As for `fit`. What the rig's law has, and one of the others has not, is left out of ``free``, ``fixed`` and
-        ``separate`` there; what it has besides is free. Ctrl-C compares the laws that have been fitted, where there
-        are two or more.
+        As for `fit`. Parameters in ``free``, ``fixed`` and ``separate`` that a law does not have are ignored for it;
+        parameters that the rig's law does not have are free. Ctrl-C compares the laws fitted so far, if there are at
+        least two.
 
     Raises
     ------
     ParameterError
-        If a law or an option is unknown or the rig's friction has no alternatives.
+        If a law or an option is unknown, or the rig's friction law has no alternatives.
     NotAvailable
         If none of the laws can follow the records.
 
@@ -239,7 +239,7 @@ def compare_laws(
     model  parameters  sum of squares   AIC    BIC  weight  left out, predicted to
     slip            6     1.56072e-05   0.0    0.0   1.000               0.0002016
     aging           6     1.70956e-05  36.5   36.5   0.000               0.0002388
-    'slip' it is: 'aging', the next, has a sum of squares +9.54% and is 36.5 behind in BIC.
+    'slip' is the best: 'aging', the next, has a sum of squares +9.54% and is 36.5 behind in BIC.
     """
     refuse_unknown("compare_laws", options, keywords_of(fit, ["rig", "records"]))
     many = tuple(records) if isinstance(records, (list, tuple)) else (records,)
@@ -278,7 +278,7 @@ def _candidates(fits: Mapping[str, Fit]) -> list[str]:
 
 
 def _usual_labels(rig: Slider, records: Sequence[Record]) -> tuple[str, ...]:
-    """Labels compared by default; with every memory of normal stress if the normal stress changes in a record."""
+    """Labels of the laws compared by default; with each memory of normal stress, if that changes in a record."""
     law = rig.friction
     imposed = rig.contact.is_imposed() or rig.contact.has_pores()
     if not (imposed and any(record.stress_changes for record in records)):
@@ -287,7 +287,7 @@ def _usual_labels(rig: Slider, records: Sequence[Record]) -> tuple[str, ...]:
 
 
 def _options_of(rig: Slider, other: Slider, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options of a fit adapted from one rig to another with a different law: names it lacks out, new ones free."""
+    """Options of a fit for a rig `other` with another law: parameters that it lacks are dropped, new ones are free."""
     before, after = (set(can_be_free(each)) for each in (rig, other))
     found = dict(options)
     for key in ("free", "fixed", "separate"):
@@ -306,11 +306,11 @@ def _full_name(name: str, known: Iterable[str]) -> str:
 
 
 def with_law(rig: Slider, label: str) -> Slider:
-    """Rig with the alternative to its friction law that a label names, such as ``"aging, two states"``."""
+    """Rig with another friction law, which a label names, such as ``"aging, two states"``."""
     known = rig.friction.alternatives()
     if not known:
         raise ParameterError(
-            [Problem("rig", f"has {type(rig.friction).__name__} friction, which names no alternatives")]
+            [Problem("rig", f"has {type(rig.friction).__name__} friction, which has no alternatives to compare")]
         )
     words = [word.strip() for word in label.replace("+", ",").split(",")]
     if not set(words) <= set(known):

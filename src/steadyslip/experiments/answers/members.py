@@ -1,7 +1,7 @@
-"""What each fit says of the population that it is a member of, in coordinates in which rocks differ together.
+"""Estimates and covariances of fits in the coordinates of a population: logarithms of parameters, and a − b.
 
-Rocks whose a and b differ by much may have nearly the same a − b, which decides their stability. So a − b is a
-coordinate of its own, in place of b, and its spread is not lost in those of a and b.
+Rocks whose a and b differ much may have nearly the same a − b, which decides their stability. Therefore a − b takes the
+place of b: its small spread would be lost in the large spreads of a and b.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from steadyslip.experiments.measured.same import is_same_measurement
 from steadyslip.experiments.numerics.pooling import ExperimentEstimate
 from steadyslip.model.sliding import steady_state
 
-DIFFERENCE = "a - b"  # a less the sum of all b, as fits name it
+DIFFERENCE = "a - b"  # name of a minus the sum of all b, as in fits
 
 
 @dataclass(frozen=True)
 class MemberQuantity:
-    """Parameter of a population, or a − b, as a function of the coordinates of its members.
+    """Parameter of a population, or a − b, as a function of the coordinates of an experiment.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class MemberQuantity:
     logarithmic : bool
         True if spreads and slopes are of the logarithm.
     parts : tuple of (Unknown, int, float)
-        Coordinates that its value is a sum of, each as its unknown, its place and its sign.
+        Terms whose sum is the value: unknown, index of its coordinate, and sign of each.
     """
 
     name: str
@@ -50,7 +50,7 @@ class MemberQuantity:
         return np.asarray(sum(sign * one.value(coordinates[..., k]) for one, k, sign in self.parts))
 
     def gradient(self, coordinates: Array) -> Array:
-        """Derivatives (..., p), of the logarithm where `logarithmic`."""
+        """Derivatives (..., p) by the coordinates, of the value or, if `logarithmic`, of its logarithm."""
         found = np.zeros_like(coordinates)
         for one, k, sign in self.parts:
             found[..., k] = 1.0 if self.logarithmic else sign * one.slope(coordinates[..., k])
@@ -58,7 +58,7 @@ class MemberQuantity:
 
 
 class Axes:
-    """Coordinates of the members of a population: those of fits, but a − b in place of the first b.
+    """Coordinates of the experiments of a population: those of fits, but with a − b in place of the first b.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Axes:
     Attributes
     ----------
     quantities : dict of str to MemberQuantity
-        Its parameters by name, in that order, then ``a - b`` if it has a and all b.
+        Parameters by name, in the order of `names`, then ``a - b`` if a and all b are parameters.
     """
 
     def __init__(self, fits: Mapping[str, Fit], names: Sequence[str]) -> None:
@@ -101,7 +101,7 @@ class Axes:
             self.effects = []
 
     def __getitem__(self, name: str) -> MemberQuantity:
-        """MemberQuantity by its name; leading parts may be left out, and ``b - a`` is the negative of ``a - b``."""
+        """Quantity of a name; leading parts of the name may be left out, and ``b - a`` is the negative of ``a - b``."""
         plain = name.replace(" ", "").replace("−", "-")
         if plain not in ("a-b", "b-a") or DIFFERENCE not in self.quantities:
             return self.quantities[resolve(name, self.quantities)]
@@ -111,7 +111,14 @@ class Axes:
         return MemberQuantity("b - a", one.unit, False, tuple((level, k, -sign) for level, k, sign in one.parts))
 
     def estimate(self, one: Fit, design: Array) -> ExperimentEstimate:
-        """Coordinates that a fit determines, with their covariance; `design` (q,) is that of its conditions."""
+        """Estimate of the coordinates that a fit determines, with their covariance.
+
+        Parameters
+        ----------
+        one : Fit
+        design : ndarray (q,)
+            Row of the regression matrix: 1 and the conditions of the experiment.
+        """
         places = {p: one.names.index(name) for p, name in enumerate(self.names) if name in one.names}
         known = {p: k for p, k in places.items() if np.isfinite(one.covariance[k, k])}
         mine, theirs = [self.unknowns[p] for p in known], [one.space.unknowns[k] for k in known.values()]
@@ -130,7 +137,7 @@ class Axes:
                 change[inner[1], inner] = np.array([slopes[0], *(-x for x in slopes[1:])]) / size
                 covariance = change @ covariance @ change.T
                 values[inner[1]] = (levels[0] - sum(levels[1:])) / size
-            elif replaced in seen:  # of b alone, without a, a − b follows from the other experiments
+            elif replaced in seen:  # b is known but a is not: a − b follows from the other experiments
                 kept = [i for i, p in enumerate(seen) if p != replaced]
                 seen, values = [seen[i] for i in kept], values[kept]
                 covariance = covariance[np.ix_(kept, kept)]
@@ -138,7 +145,7 @@ class Axes:
 
 
 def shared_names(fits: Mapping[str, Fit], names: Sequence[str] | None) -> tuple[str, ...]:
-    """Full names of the parameters of a population; all of friction that every fit has, unless `names` are given."""
+    """Full names of the parameters of a population; by default those of friction that are fitted in every fit."""
     every = dict.fromkeys(name for one in fits.values() for name in one.names if "@" not in name)
     if names is None:
         found = [n for n in every if n.startswith("friction.") and all(n in one.names for one in fits.values())]
@@ -150,7 +157,7 @@ def shared_names(fits: Mapping[str, Fit], names: Sequence[str] | None) -> tuple[
 
 
 def problems_together(fits: Mapping[str, Fit]) -> list[Problem]:
-    """Problems of fits that cannot be of one population: several laws, rates of reference, or the same record twice."""
+    """Problems of fits that make no population: different laws or reference velocities, or the same record twice."""
     rigs = {label: one.plan.rig for label, one in fits.items()}
     if len({type(rig.friction) for rig in rigs.values()}) > 1:
         return [Problem("fits", "are of several friction laws; allowed: one")]
@@ -168,8 +175,8 @@ def problems_together(fits: Mapping[str, Fit]) -> list[Problem]:
             )
             known.append((label, record))
             if first is not None:
-                message = f"has the record of {first} again ({record.source}), whole, cut or averaged; an experiment "
-                found.append(Problem(f"fits.{label}", f"{message}counts once"))
+                message = f"has the record of {first} again ({record.source}), whole, cut or averaged; use it once only"
+                found.append(Problem(f"fits.{label}", message))
     return found
 
 
@@ -183,7 +190,7 @@ def labelled(fits: Sequence[Fit]) -> dict[str, Fit]:
 
 
 def conditions_of(fits: Mapping[str, Fit], given: Any) -> dict[str, Array]:
-    """Conditions by name, one number for each experiment, from what the user gave: lists, or numbers by label."""
+    """Conditions (experiments,) by name, from the user's lists of numbers or mappings of labels to numbers."""
     if given is None:
         return {}
     if given == STRESS:
@@ -193,7 +200,7 @@ def conditions_of(fits: Mapping[str, Fit], given: Any) -> dict[str, Array]:
     for name, values in given.items() if isinstance(given, Mapping) else [("", None)]:
         if isinstance(values, Mapping):
             if set(values) != set(fits):
-                message = f"got those of {', '.join(map(str, values))}; allowed: one of each of {', '.join(fits)}"
+                message = f"got values for {', '.join(map(str, values))}; allowed: one for each of {', '.join(fits)}"
                 problems.append(Problem(f"conditions.{name}", message))
                 continue
             values = [values[label] for label in fits]

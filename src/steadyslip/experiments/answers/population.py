@@ -1,7 +1,8 @@
 """Hierarchical (partially pooled) analysis of several experiments on one rock.
 
-Every experiment has parameters of its own, drawn from a population with unknown mean and covariance. Parameters that an
-experiment determines poorly are drawn towards the others, the more so the less the experiments differ.
+The true parameters of each experiment are taken as a sample from a population with unknown mean and covariance.
+Estimates that an experiment determines poorly are shifted towards the population's mean, the more so the less the
+experiments differ.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from steadyslip.experiments.numerics.pooling import Pooled, pooled
 from steadyslip.files.result_tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.files.sealed import FileKind
 
-FEWEST = 3  # experiments that determine a parameter: two cannot tell a spread from a difference
+FEWEST = 3  # least number of experiments that determine a parameter: two do not show a spread
 ENDS = (0.025, 0.16, 0.5, 0.84, 0.975)  # probabilities of the quantiles: median, and 68 % and 95 % intervals
 POPULATION = FileKind("population", 3, 2**30, "make the population of its fits again and save it anew")
 _ATTRIBUTES = {"names": str, "scale": float, "chains": int, "steps": int, "time": float}
@@ -52,22 +53,23 @@ _COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class Population(ReadOnly):
-    """Population that several experiments are members of, with draws from its posterior.
+    """Population of the parameters of several experiments, as draws from its posterior.
 
     Attributes
     ----------
     fits : dict of str to Fit
         Fits of the experiments, by label.
     names : tuple of str
-        Names of the parameters. Where a and all b are among them, ``a - b`` (a less the sum of all b) is a name too.
+        Names of the parameters. If a and all b are among them, methods also take ``a - b`` (a minus the sum of all b).
     conditions : dict of str to ndarray (experiments,)
         Conditions on which the means may depend, by name.
     scale : float
-        Scale s₀ of the prior of the spreads, exp(−s²/2s₀²)/√s, e-folds or natural sizes.
+        Scale s₀ of the prior exp(−s²/2s₀²)/√s of a spread s (standard deviation between experiments), in e-folds, or in
+        natural sizes of parameters of any sign.
     draws : Pooled
         Draws from the posterior, in the coordinates of `axes`.
     where : dict of str to float
-        Conditions that means and new experiments are at, as `at` sets them; others are at their mean.
+        Conditions to which means and new experiments refer, as set by `at`; the mean for other conditions.
     """
 
     fits: Mapping[str, Fit]
@@ -79,7 +81,7 @@ class Population(ReadOnly):
 
     @property
     def kind(self) -> str:
-        """What predictions from it are of."""
+        """Text that names what a prediction from the population is about: another experiment."""
         return f"another experiment of a population{self._at}"
 
     @property
@@ -93,7 +95,7 @@ class Population(ReadOnly):
         return Axes(self.fits, self.names)
 
     def at(self, where: Mapping[str, float]) -> Population:
-        """The same population with its means, new experiments and predictions at other conditions.
+        """Population whose means, new experiments and predictions refer to given conditions.
 
         Parameters
         ----------
@@ -103,7 +105,7 @@ class Population(ReadOnly):
         Raises
         ------
         ParameterError
-            If a condition is unknown or no finite number.
+            If a condition is unknown or not a finite number.
         """
         allowed = ", ".join(map(repr, self.conditions)) or "none were given"
         if not isinstance(where, Mapping):
@@ -123,13 +125,13 @@ class Population(ReadOnly):
 
     @cached_property
     def _shift(self) -> Array:
-        """Coordinates (m, p) of the means less those at mean conditions."""
+        """Change (m, p) of the means' coordinates from mean conditions to the conditions `where`."""
         away = [self.where.get(name, np.mean(x)) - np.mean(x) for name, x in self.conditions.items()]
         return np.asarray(self.draws.mean[:, :, 1:] @ np.array(away).reshape(-1))
 
     @cached_property
     def _mean(self) -> Array:
-        """Coordinates (m, p) of the means."""
+        """Coordinates (m, p) of the means at the conditions `where`."""
         return np.asarray(self.draws.mean[:, :, 0] + self._shift)
 
     def mean(self, name: str) -> Estimate:
@@ -145,19 +147,19 @@ class Population(ReadOnly):
         return self._estimate(one, one.value(self.draws.members[:, list(self.fits).index(label)]))
 
     def others(self, seed: int = 0) -> dict[str, Array]:
-        """Draws (m,) of all parameters of a new experiment on this rock, as they belong together; see `mean`."""
+        """Joint draws (m,) of all parameters of a new experiment on this rock, by name, at the conditions of `mean`."""
         found = self.draws.another(seed) + self._shift
         return {name: one.value(found) for name, one in self.axes.quantities.items()}
 
     def another(self, name: str, seed: int = 0) -> Estimate:
-        """Parameter predicted for a new experiment on this rock, with all uncertainties; conditions as of `mean`."""
+        """Parameter predicted for a new experiment on this rock, with all uncertainties; conditions as in `mean`."""
         one = self.axes[name]
         return self._estimate(one, one.value(self.draws.another(seed) + self._shift))
 
     def spread(self, name: str, level: float = 0.95) -> tuple[float, float, float]:
         """Standard deviation between experiments: median and ends of its central interval of probability `level`.
 
-        Of the logarithm of a positive parameter, else in SI units.
+        It is the standard deviation of the logarithm of a positive parameter; for others it is in SI units.
         """
         slopes = self.axes[name].gradient(self._mean)
         return _middle_and_ends(np.linalg.norm(slopes[:, None, :] @ self.draws.root, axis=(1, 2)), level)
@@ -179,15 +181,14 @@ class Population(ReadOnly):
         return np.asarray(np.sum(one.gradient(self._mean) * self.draws.mean[:, :, k], axis=1))
 
     def _estimate(self, one: MemberQuantity, values: Array) -> Estimate:
-        """Median, half of the 68 % interval and the 95 % interval of draws."""
+        """Estimate from draws `values` (m,): median, error (half of the 68 % interval) and 95 % interval."""
         low, below, middle, above, high = (float(x) for x in np.quantile(values, ENDS))
         area = next(iter(self.fits.values())).plan.rig.area
         return Estimate(one.name, middle, (above - below) / 2, one.unit, low, high, area)
 
     def __str__(self) -> str:
         count = len(self.names)
-        own = f"{count} parameter{'s' * (count != 1)} of its own"
-        lines = [f"population of {len(self.fits)} experiments, each with {own}"]
+        lines = [f"population of {len(self.fits)} experiments, {count} parameter{'s' * (count != 1)} each"]
         wide = max(map(len, self.fits))
         for i, label in enumerate(self.fits if self.conditions else ()):
             given = ", ".join(f"{c} {_condition(c, x[i])}" for c, x in self.conditions.items())
@@ -208,15 +209,15 @@ class Population(ReadOnly):
         return "\n".join([*lines, "", *self._about()])
 
     def _about(self) -> list[str]:
-        """Lines on what holds for all parameters: correlations, priors, conditions, and whether chains have mixed."""
+        """Lines of text on correlations, priors, conditions, and chains that have not mixed."""
         pairs = {pair: found for pair, found in self._correlations().items() if found[1] * found[2] > 0}
         lines = [
-            f"differ together {first} and {second}, correlation {middle:.2g} ({low:.2g} to {high:.2g})"
+            f"correlated      {first} and {second}, correlation {middle:.2g} ({low:.2g} to {high:.2g})"
             for (first, second), (middle, low, high) in pairs.items()
         ]
         lines.append(
-            f"priors          of means flat; of spreads s exp(-s²/2s0²)/√s, s0 = {self.scale:g} e-folds or natural "
-            "sizes; of correlations towards none"
+            f"priors          flat for means; exp(-s²/2s0²)/√s for spreads s, s0 = {self.scale:g} e-folds or natural "
+            "sizes; small correlations preferred"
         )
         if self.conditions:
             where = {name: self.where.get(name, float(np.mean(x))) for name, x in self.conditions.items()}
@@ -224,12 +225,12 @@ class Population(ReadOnly):
             for name, x in self.conditions.items():
                 if not np.min(x) <= where[name] <= np.max(x):
                     ends = " to ".join(_condition(name, float(end)) for end in (np.min(x), np.max(x)))
-                    lines.append(f"! {name} {_condition(name, where[name])} is beyond {ends} of the experiments: the "
-                                 "straight lines through these are prolonged")  # fmt: skip
+                    lines.append(f"! {name} {_condition(name, where[name])} is outside {ends} of the experiments: the "
+                                 "straight lines through them are extrapolated")  # fmt: skip
         if not self.draws.mixed:
             lines.append(
                 f"! the chains have not mixed ({self.draws.steps} steps, autocorrelation over {self.draws.time:.3g}): "
-                "these numbers depend on where they began; take more draws, or fewer parameters"
+                "these numbers depend on where the chains began; take more draws, or fewer parameters"
             )
         return lines
 
@@ -238,12 +239,12 @@ class Population(ReadOnly):
 
     @property
     def weakening(self) -> float:
-        """Probability that a new experiment has b > a, summed over all b; NaN where these are no parameters."""
+        """Probability that a new experiment has b > a (b: sum of all b); NaN if these are not all parameters."""
         level = self.others().get(DIFFERENCE)
         return float("nan") if level is None else float(np.mean(level < 0))
 
     def alone(self, name: str) -> dict[str, Estimate | None]:
-        """Estimate of each fit alone, by label; None where it has none, or does not determine it."""
+        """Estimate of a parameter by each fit alone, by label; None for a fit that lacks or does not determine it."""
         full = self.axes[name].name
         found = {label: next((e for e in (*one.estimates, *one.derived) if e.name == full), None)
                  for label, one in self.fits.items()}  # fmt: skip
@@ -274,7 +275,7 @@ class Population(ReadOnly):
         write_table(path, POPULATION, table, [store.to_dataset(one) for one in self.fits.values()])
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw every parameter of every experiment, fitted alone and pooled, and of the population.
+        """Plot every parameter for each experiment, fitted alone and pooled, and for the population.
 
         Returns
         -------
@@ -288,8 +289,8 @@ class Population(ReadOnly):
         Returns
         -------
         arviz.InferenceData, or xarray.DataTree from version 1 of ArviZ on
-            Group ``posterior``: for every parameter, as ``friction.a``, that of each experiment, its ``.mean`` and
-            ``.spread`` (as `spread` counts), and its slope with every condition, as ``friction.a.temperature``.
+            Group ``posterior``: for every parameter, such as ``friction.a``, its values in the experiments, its
+            ``.mean`` and ``.spread`` (as in `spread`), and its slope with each condition: ``friction.a.temperature``.
 
         Raises
         ------
@@ -337,7 +338,7 @@ class Population(ReadOnly):
 
 
 def _middle_and_ends(values: Array, level: float = 0.95) -> tuple[float, float, float]:
-    """Median of draws, and ends of their central interval of probability `level`."""
+    """Median of draws (m,), and ends of their central interval of probability `level`."""
     low, middle, high = np.quantile(values, [0.5 - level / 2, 0.5, 0.5 + level / 2])
     return float(middle), float(low), float(high)
 
@@ -361,7 +362,7 @@ def _spread_words(found: tuple[float, float, float], one: MemberQuantity, mean: 
 def _slope_words(
     found: tuple[float, float, float], one: MemberQuantity, condition: str, values: Array, mean: float
 ) -> str:
-    """Text of the change of the mean from the least to the largest value of a condition."""
+    """Text on the change of the mean from the smallest to the largest value of a condition."""
     ends = (float(np.min(values)), float(np.max(values)))
     whole = " to ".join(_condition(condition, x) for x in ends)
     middle, low, high = (x * (ends[1] - ends[0]) for x in found)
@@ -385,7 +386,7 @@ def load_population(path: str | PathLike[str]) -> Population:
     Raises
     ------
     NotAvailable
-        If the file is not one of ours, is damaged, or cannot be read.
+        If the file was not written by `Population.save`, is damaged, or cannot be read.
 
     Examples
     --------
@@ -414,7 +415,7 @@ def load_population(path: str | PathLike[str]) -> Population:
     if about["chains"] < 1 or table.sizes["draw"] % about["chains"]:
         raise table.fault(f"it has {table.sizes['draw']} draws of {about['chains']} chains")
     if not all(np.all(np.isfinite(own)) for own in found.values()):
-        raise table.fault("no population has its numbers")
+        raise table.fault("its numbers are impossible for a population")
     return Population(
         fits, tuple(named["parameters"]), conditions, about["scale"],
         Pooled(found["mean"], found["root"], found["members"], about["time"], about["steps"], about["chains"]),
@@ -427,27 +428,27 @@ def population(
     conditions: str | Mapping[str, Sequence[float] | Mapping[str, float]] | None = None, scale: float = 1.0,
     count: int = 4000, seed: int = 0,
 ) -> Population:  # fmt: skip
-    """Estimate the population of several experiments, each fitted on its own.
+    """Population of the parameters of several experiments, estimated from a fit to each of them.
 
-    Every experiment enters with its estimates and their full covariance: a normal likelihood in the coordinates of the
-    fit, logarithms of positive parameters, but a − b in place of the first b. Experiments may differ in several
-    parameters together (correlated). A parameter that an experiment does not determine follows from the others.
+    Each fit enters with its estimates and their full covariance, as a normal likelihood of the logarithms of positive
+    parameters and of the values of others, with a − b in place of the first b. Differences between experiments may be
+    correlated. A parameter that an experiment does not determine is estimated from the others.
 
     Parameters
     ----------
     fits : mapping of str to Fit, or sequence of Fit
-        By label; the file of the record unless labelled. All of one friction law.
+        Fits by label; labels are the file names of the records unless given. All have the same friction law.
     names : sequence of str, optional
-        Parameters; all of the friction law that are fitted in every experiment unless given.
+        Parameters; by default all of the friction law that are fitted in every experiment.
     conditions : mapping of str to sequence of float or mapping, or str, optional
-        What the means may depend on, one number for every experiment, in their order or by label, such as
-        ``{"temperature": {"p1": 20, "p2": 100, "p3": 250}}``: straight lines, of the logarithm where a parameter must
-        be positive. ``"normal stress"``: that of the records.
+        Conditions on which the means depend linearly (their logarithms, for positive parameters), one number for every
+        experiment, in their order or by label, such as ``{"temperature": {"p1": 20, "p2": 100, "p3": 250}}``; or
+        ``"normal stress"`` for the normal stress of the records.
     scale : float
-        s₀ of the prior of the spreads, exp(−s²/2s₀²)/√s, in e-folds (or natural sizes): with few experiments it keeps
-        out spreads that nobody would believe.
+        s₀ of the prior exp(−s²/2s₀²)/√s of a spread s, in e-folds (or natural sizes): with few experiments, it excludes
+        spreads that are implausibly large.
     count : int
-        Draws.
+        Number of draws.
     seed : int
 
     Returns
@@ -457,7 +458,7 @@ def population(
     Raises
     ------
     ParameterError
-        If there are too few experiments for this, or they do not have the parameters.
+        If there are too few experiments, or they do not have the parameters.
     NotAvailable
         If emcee is not installed.
 

@@ -1,4 +1,4 @@
-"""Design of experiments: errors of the parameters that a fit to a planned experiment would have."""
+"""Design of experiments: errors of the parameters in a fit to a planned experiment."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ SAMPLES = 4000  # default number of samples; errors fall with its square root
 
 @dataclass(frozen=True, eq=False)
 class Precision(ReadOnly):
-    """Errors that a fit to a planned experiment would have, to first order (Fisher information).
+    """Errors of the parameters in a fit to a planned experiment, to first order (Fisher information).
 
     Attributes
     ----------
     protocol : Protocol
     errors : dict of str to float
-        Standard deviations, SI units; inf where the experiment does not determine a parameter.
+        Standard deviations, SI units; inf for parameters that the experiment does not determine.
     relative : dict of str to float
-        Standard deviations as shares of the parameters.
+        Standard deviations divided by the parameters.
     correlation : ndarray (p, p)
-        Correlation of the estimates; NaN where one is not determined.
+        Correlation of the estimates; NaN for parameters that are not determined.
     unidentified : tuple of Combination
         Combinations of parameters that the experiment does not determine.
     noise : float
@@ -91,7 +91,7 @@ def precision(
     rig: Slider, protocol: Any, *, free: Sequence[str] | None = None, fixed: Sequence[str] = (), noise: float = 2e-4,
     until: float | None = None, samples: int = SAMPLES, trend: int = 0,
 ) -> Precision:  # fmt: skip
-    """Errors that a fit to a planned experiment would have.
+    """Errors of the parameters in a fit to a planned experiment.
 
     Parameters
     ----------
@@ -101,9 +101,9 @@ def precision(
     free, fixed : sequence of str, optional
         As for `fit`.
     noise : float
-        Standard deviation of friction, sample by sample, independent.
+        Standard deviation of the noise of friction, independent from sample to sample.
     until : float, optional
-        End of the experiment, s; the protocol's own unless given.
+        End of the experiment, s; by default that of the protocol.
     samples : int
         Number of evenly spaced samples.
     trend : int
@@ -112,9 +112,9 @@ def precision(
     Raises
     ------
     ParameterError
-        Listing everything that is wrong.
+        If options are wrong; lists every problem.
     NotAvailable
-        If the motion cannot be followed to the end.
+        If the motion cannot be simulated to the end.
 
     Examples
     --------
@@ -152,7 +152,7 @@ def precision(
     z = space.coordinates(np.array(values))
     seen, jacobian = whole.comparison().model(z[None])
     if not np.all(np.isfinite(seen)):
-        raise NotAvailable("the motion of this experiment cannot be followed to its end; is the rig stable?")
+        raise NotAvailable("the motion in this experiment cannot be simulated to its end; is the rig stable?")
     rows = jacobian[0]
     information = rows @ rows.T
     covariance, lost = combinations(information, noise**2 * information, space)
@@ -201,7 +201,7 @@ class Ranking:
         return "\n".join(lines)
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw the error of the parameter for each experiment.
+        """Plot the error of the parameter for each experiment.
 
         Returns
         -------
@@ -214,23 +214,23 @@ class Ranking:
 def best_protocol(
     rig: Slider, candidates: Mapping[str, Any] | None = None, parameter: str | None = None, **options: Any
 ) -> Ranking:
-    """Rank planned experiments by the error of one parameter.
+    """Ranking of planned experiments by the error of one parameter.
 
     Parameters
     ----------
     rig : Slider
     candidates : mapping of str to Protocol, optional
-        Experiments by label; unless given, changes of the normal stress of several shapes, with and without a
-        velocity step.
+        Experiments by label; by default changes of the normal stress of several shapes, with and without a velocity
+        step.
     parameter : str, optional
-        Name of the parameter; unless given, the law's stress share, by which friction responds to normal stress.
+        Name of the parameter; by default the one that sets how friction responds to changes of the normal stress.
     **options
         As for `precision`.
 
     Raises
     ------
     ParameterError
-        If an option is unknown, the parameter is not free, or none is given and the law has not exactly one such share.
+        If an option is unknown, the parameter is not free, or it is not given and the law has no default for it.
 
     Examples
     --------
@@ -263,7 +263,11 @@ def best_protocol(
 
 
 def normal_stress_protocols(rig: Slider, share: float = 0.05) -> dict[str, Protocol]:
-    """Protocols, by label, that change the normal stress by a share of it in several shapes, timed for the rig."""
+    """Protocols that change the normal stress, by the label of their shape.
+
+    Times are multiples of the time in which the rig slides its slip distance; `share` is the relative change of the
+    normal stress.
+    """
     level = steady_state(rig).normal_stress
     size = share * level
     unit = _slip_time(rig)

@@ -1,4 +1,4 @@
-"""Predict the stability of a rig with fitted friction, carrying the uncertainty of the fit."""
+"""Prediction of the stability of a rig with fitted friction, including the uncertainty of the fit."""
 
 from __future__ import annotations
 
@@ -28,11 +28,13 @@ from steadyslip.nonlinear.kicks.kicks import KICKS
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED
 
 COUNT = 4000  # default number of draws: errors of a probability are below 1 %
-KICK_DRAWS = 200  # draws for which thresholds of kicks are computed, each by simulations
+KICK_DRAWS = 200  # number of draws for which thresholds of kicks are computed by simulation
 LEVELS = (0.025, 0.16, 0.5, 0.84, 0.975)  # probabilities of the quantiles: median, 68 % and 95 % intervals
-EFFECT, ROUNDING = 0.05, 1e-9  # relative change of a parameter, and of an answer that does not depend on it
-DECISIVE = ("direct effect", "evolution effect", "slip distance")  # kinds that a machine's file does not lend a rock
-CLEAR_PROBABILITY = 0.95  # probability above which the text says stable or unstable
+EFFECT, ROUNDING = 0.05, 1e-9
+"""Relative change of a parameter in the test of its effect, and largest relative change of an unaffected result."""
+DECISIVE = ("direct effect", "evolution effect", "slip distance")
+"""Kinds of parameters that decide stability: they must be fitted and are never taken from the file of the rig."""
+CLEAR_PROBABILITY = 0.95  # the text says stable or unstable from this probability on
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,22 +46,23 @@ class Prediction(ReadOnly):
     rig : Slider
         Rig with the best fitted friction.
     draws : Draws or Population
-        Draws of the fitted parameters, or the population that a new experiment was drawn of.
+        Draws of the fitted parameters, or the population from which parameters of a new experiment were drawn.
     stable : ndarray of bool (m,)
         True for draws with stable steady sliding.
     exists : ndarray of bool (m,)
         True for draws that have steady sliding.
     critical_stiffness : ndarray (m,)
-        Critical stiffness, Pa/m; NaN where there is no edge of stability.
+        Critical stiffness, Pa/m; NaN for draws without an edge of stability.
     safety : ndarray (m,)
         Stiffness over critical stiffness.
     growth_rate : ndarray (m,)
         Growth rate of the least stable mode, 1/s.
     thresholds : dict of str to ndarray
-        Smallest kicks not survived, by kind of kick, in the units of `Threshold`; of the first draws only.
+        Smallest kicks after which sliding does not become steady again, by kind of kick, in the units of `Threshold`;
+        for the first draws only.
     shares : dict of str to float
-        Share of the variance of the critical stiffness (of the growth rate, where there is none) that vanishes once a
-        parameter, or b − a, is known exactly.
+        Share of the variance of the critical stiffness (or growth rate, if there is no critical stiffness) that would
+        vanish if a parameter, or b − a, were known exactly, by name.
     left_out : tuple of str
         Kinds of kick that were not computed before Ctrl-C.
     """
@@ -119,27 +122,27 @@ class Prediction(ReadOnly):
             lines.append(f"stopped                 before the kicks were done: {', '.join(self.left_out)}")
         if self.shares:
             found = ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.shares.items() if share >= 0.005)
-            lines.append(f"spread taken away by    {found}, each known by itself")
+            lines.append(f"uncertainty due to      {found}")
         if self.kept:
             found = ", ".join(f"{name} = {value:.4g}" for name, value in self.kept.items())
-            lines.append(f"not in the population   {found}, of the rig")
+            lines.append(f"not in the population   {found}, taken from the rig")
         lines.append(f"from {len(self.stable)} draws, {self.draws.kind}")
         return "\n".join(lines)
 
     @property
     def kept(self) -> dict[str, float]:
-        """Parameters of friction, by name, that the population of the draws lacks, with the rig's values."""
+        """Values of friction parameters that the population lacks and that are taken from the rig, by name."""
         return _kept(self.rig, self.draws) if isinstance(self.draws, Population) else {}
 
     @property
     def undecided(self) -> dict[str, float]:
-        """Share of the draws with steady sliding whose threshold is undecided, by kind of kick."""
+        """Share of the draws with steady sliding for which the threshold is undecided, by kind of kick."""
         return {
             kick: float(np.mean(np.isnan(sizes) & self.exists[: len(sizes)])) for kick, sizes in self.thresholds.items()
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert to a dict of JSON-ready data, SI units; None for what does not exist."""
+        """Convert to a dict of JSON-ready data, SI units; None for values that do not exist."""
 
         def plain(values: Array) -> list[float | None]:
             return [x if np.isfinite(x) else None for x in self.quantiles(values)]
@@ -172,7 +175,7 @@ class Prediction(ReadOnly):
         return {"forces": {"area": self.rig.area, "critical_stiffness": values, "unit": unit}}
 
     def plot(self, kind: str = "prediction", ax: Any = None) -> Any:
-        """Draw the distribution of the critical stiffness with the rig's stiffness, or of the thresholds of kicks.
+        """Plot the distribution of the critical stiffness with the rig's stiffness, or of the thresholds of kicks.
 
         Parameters
         ----------
@@ -192,24 +195,24 @@ def predict(
     rig: Slider, fit: Fit | Draws | Population, *, kick: str | Sequence[str] = (), transfer: Sequence[str] = (),
     record: int = 0, count: int = COUNT, seed: int = 0,
 ) -> Prediction:  # fmt: skip
-    """Predict the stability of a rig with fitted friction, carrying the uncertainty of the fit.
+    """Predict the stability of a rig with fitted friction, including the uncertainty of the fit.
 
     Parameters
     ----------
     rig : Slider
-        The machine or fault in question. Its friction is replaced by the fitted one; its memory of normal stress is
-        kept where the fit has none.
+        The machine or fault to predict. Its friction is replaced by the fitted friction; its memory of normal stress is
+        kept if the fit has none.
     fit : Fit, Draws or Population
-        Draws from `bootstrap` or `posterior`, or a fit, whose covariance is drawn from; of a population, the friction
-        is that of one more experiment on its rock, at mean conditions.
+        Draws from `bootstrap` or `posterior`; or a fit, for normal draws with its covariance; or a population, for the
+        friction in one more experiment on its rock (at mean conditions unless set by `Population.at`).
     kick : str or sequence of str, optional
-        Kinds of kick whose thresholds to find, as for `steadyslip.threshold`.
+        Kinds of kick for which to compute thresholds, as for `steadyslip.threshold`.
     transfer : sequence of str, optional
         Further fitted parameters that hold for the rig, such as ``slider.stiffness`` for the machine of the records.
     record : int, optional
-        Which record's parameters to take, where records have their own.
+        Index of the record whose parameters to take, if some differ between records.
     count : int, optional
-        Draws from the covariance.
+        Number of draws from the covariance of a fit.
     seed : int, optional
 
     Returns
@@ -221,7 +224,7 @@ def predict(
     ParameterError
         If a name is unknown.
     NotAvailable
-        If the fit does not determine what has an effect here.
+        If the fit does not determine a parameter that affects the prediction.
 
     Examples
     --------
@@ -240,10 +243,10 @@ def transferred(
     rig: Slider, fit: Fit | Draws | Population, transfer: Sequence[str] = (), record: int = 0, count: int = COUNT,
     seed: int = 0, *, linear: bool = False,
 ) -> tuple[Slider, Draws | Population, dict[str, Array]]:  # fmt: skip
-    """Rig with the best fitted friction, the draws, and their values of the rig's parameters; see `predict`.
+    """Rig with the best fitted friction, the draws, and drawn values (m,) by parameter of the rig; see `predict`.
 
-    A friction parameter that is not determined is refused, unless only what is `linear` is asked, and it has no effect
-    on that.
+    A friction parameter that the fit does not determine raises `NotAvailable`, unless only linear stability is wanted
+    (`linear`) and the parameter has no effect on it.
     """
     source = _source(fit)
     target = with_fitted_friction(rig, source, record)
@@ -275,7 +278,7 @@ def transferred(
         lost -= _without_effect(target, {name: belonging[name] for name in lost})
     if isinstance(fit, Population):
         if lost:
-            message = f"{', '.join(sorted(lost))}: fitted, but not in the population; name them in its parameters"
+            message = f"{', '.join(sorted(lost))}: fitted, but not in the population; add them to its names"
             raise NotAvailable(message)
         return target, fit, {belonging[name]: own for name, own in values.items()}
     held = [one for one in source.names if one not in lost]
@@ -284,9 +287,9 @@ def transferred(
 
 
 def _kept(rig: Slider, rock: Population) -> dict[str, float]:
-    """Parameters of friction that a population lacks, with the values of the rig; not those that decide its stability.
+    """Values, from the rig, of friction parameters that a population lacks, by name; only if they hardly matter.
 
-    A rig's level of friction is as good as the rock's; its a, b or d_c would be those of another rock.
+    The level of friction may come from the rig's file; a, b and d_c in it would be those of another rock.
     """
     fitted = {one.parameter for one in _source(rock).space.unknowns} - {
         one.name for one in rock.axes.quantities.values()
@@ -299,12 +302,12 @@ def _kept(rig: Slider, rock: Population) -> dict[str, float]:
 
 
 def _source(fit: Fit | Draws | Population) -> Fit:
-    """Fit whose friction law a prediction takes."""
+    """Fit that gives the friction law of a prediction."""
     return fit if isinstance(fit, Fit) else fit.fit if isinstance(fit, Draws) else next(iter(fit.fits.values()))
 
 
 def _without_effect(target: Slider, names: Mapping[str, str]) -> set[str]:
-    """Keys of those parameters of a rig on which neither growth rate nor critical stiffness depends."""
+    """Keys of `names` whose parameters of the rig affect neither its growth rate nor its critical stiffness."""
     found = set()
     for key, name in names.items():
         value = target.value(name) or 1.0
@@ -343,7 +346,7 @@ def with_fitted_friction(rig: Slider, fit: Fit, record: int = 0) -> Slider:
 
 
 def _difference(rig: Slider, vary: dict[str, Array]) -> dict[str, Array]:
-    """Draws of b − a, by label, which decides stability more than b or a alone; empty if neither was fitted."""
+    """Draws (m,) of b − a by label; it decides stability more than b or a alone. Empty if neither was fitted."""
     direct, evolved = rig.of_kind("direct effect"), rig.of_kind("evolution effect")
     if not direct or not evolved or not {*direct, *evolved} & set(vary):
         return {}
@@ -369,7 +372,7 @@ def _shares(vary: dict[str, Array], critical: Array, growth: Array) -> dict[str,
 
 
 def probability_text(share: float, count: int) -> str:
-    """Format a probability, no finer than the number of draws allows (3 / count: 95 % bound of no event)."""
+    """Probability as text, no finer than `count` draws allow: with no event among them it is below 3 / count (95 %)."""
     if share >= 1:
         return f"more than {100 * (1 - 3 / count):.4g} %"
     if share <= 0:

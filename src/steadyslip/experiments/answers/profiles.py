@@ -20,7 +20,8 @@ from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
 
 LEVEL = 0.95  # probability of the intervals that are compared
-END_TOLERANCE = 0.15  # largest difference of interval ends, as a share of the error's reach, of a Gaussian profile
+END_TOLERANCE = 0.15
+"""Largest difference between interval ends by a Gaussian profile and by the fit's error, over half the width."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +39,7 @@ class Profile(ReadOnly):
     rise : ndarray (m,)
         Minus twice the logarithm of the profile likelihood, zero at the best value; 1 at one standard deviation.
     normal : ndarray (m,)
-        Rise of a normal distribution with the fit's error; NaN where the fit does not determine the parameter.
+        Rise for a normal distribution with the fit's error; NaN if the fit does not determine the parameter.
     area : float or None
         Contact area of the rig, m²; if given, text shows totals for the whole contact.
     """
@@ -52,7 +53,7 @@ class Profile(ReadOnly):
     area: float | None = None
 
     def interval(self, level: float = LEVEL) -> tuple[float, float]:
-        """Confidence interval of probability `level`, SI units; an end is infinite if the profile ends before."""
+        """Confidence interval of probability `level`, SI units; an end beyond the profile is infinite."""
         low, high = self._ends(self.rise, level)
         return low, high
 
@@ -86,9 +87,9 @@ class Profile(ReadOnly):
         text = f"{self.name}, 95 % by its profile: {self._interval_text(self.rise)}"
         if self.gaussian:
             return text
-        return f"{text}; not Gaussian, its error alone would say {self._interval_text(self.normal)}" if np.all(
-            np.isfinite(self.normal)
-        ) else f"{text}; not Gaussian, no error can stand for it"  # fmt: skip
+        if not np.all(np.isfinite(self.normal)):
+            return f"{text}; not Gaussian, and not determined"
+        return f"{text}; not Gaussian, its standard error would give {self._interval_text(self.normal)}"
 
     def _interval_text(self, rise: Array) -> str:
         ends = self._ends(rise, LEVEL)
@@ -97,7 +98,7 @@ class Profile(ReadOnly):
         )
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw the profile with its intervals, and the parabola of the fit's error.
+        """Plot the profile with its intervals, and the parabola of the fit's error.
 
         Returns
         -------
@@ -108,14 +109,15 @@ class Profile(ReadOnly):
 
 @checked(reach=finite(0, 1e6), count=whole(2, 10**5), threads=THREADS, name=NAME)
 def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads: int | None = None) -> Profile:
-    """Compute the likelihood profile of a parameter: all others are fitted again at each of its values.
+    """Likelihood profile of a parameter: all others are fitted again at each of its values.
 
     Parameters
     ----------
     fit : Fit
     name : str
     reach : float
-        Range on both sides, in standard deviations; if the parameter is not determined, 2 e-folds or natural sizes.
+        Range on both sides in standard deviations. If the parameter is not determined, the range is 2 e-folds, or 2
+        natural sizes of a parameter of any sign.
     count : int
         Number of values.
     threads : int, optional
@@ -124,7 +126,7 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
     Raises
     ------
     NotAvailable
-        If the search of the fit had not come to its end.
+        If the search of the fit was stopped before it ended.
 
     Examples
     --------
@@ -139,7 +141,7 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
     width = np.sqrt(variance) * reach if np.isfinite(variance) else 2.0
     z = np.tile(fit.coordinates, (count, 1))
     z[:, i] = fit.coordinates[i] + width * np.linspace(-1, 1, count)
-    if np.isfinite(variance):  # other coordinates start where the covariance expects them
+    if np.isfinite(variance):  # start the other coordinates at their expected values for the given covariance
         slope = fit.covariance[:, i] / variance
         slope[~np.isfinite(slope)] = 0.0
         z = fit.coordinates + (z[:, i : i + 1] - fit.coordinates[i]) * slope
@@ -161,7 +163,7 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
 
 
 def _unit_of_rise(fit: Fit, i: int) -> float:
-    """Rise of the sum of squares at one standard deviation from the minimum, by noise and by the uncertain loading."""
+    """Rise of the sum of squares at one standard deviation of parameter i, for the noise and the uncertain loading."""
     _, jacobian = fit.comparison.residuals(fit.coordinates[None])
     rows = jacobian[0]
     inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-13, hermitian=True)

@@ -30,16 +30,16 @@ from steadyslip.files.sealed import FileKind
 
 REFITS_AT_ONCE = 32  # refits at a time: four SIMD vectors of eight lanes, which bounds the memory
 BOOTSTRAPS = ("auto", "block", "residual")
-REFIT_TOLERANCE = (
-    1e-6  # a refit stops when the predicted relative decrease of the sum of squares is below; its scatter is larger
-)
-BLOCK = 10.0  # length of blocks, in samples that are worth one: of a sum of AR(1) noise they lose 5 % of the variance
-MAX_BLOCK_SHARE = 0.1  # longest block, as a share of the record: longer ones would leave too few to resample
+REFIT_TOLERANCE = 1e-6
+"""A refit stops at a smaller predicted relative decrease of the sum of squares, which scatters more between refits."""
+BLOCK = 10.0
+"""Length of a block, in numbers of correlated samples worth an independent one: 5 % of the variance of sums is lost."""
+MAX_BLOCK_SHARE = 0.1  # longest block, as a share of the record: longer blocks would be too few to resample
 MIXED, FEWEST_TIMES = 1.1, 20
-"""R-hat below which chains have mixed, and steps they need, in autocorrelation times; chosen by trial: walkers are
-many, so that each has few draws."""
-FEWEST = 40  # draws of which an interval of 95 % leaves one beyond each end
-MOST_POINTS = 5e7  # numbers of a quantity that has one for each draw and sample: half a gigabyte
+"""Chains have mixed below this R-hat and after this number of autocorrelation times; chosen by trial for many walkers,
+each with few draws."""
+FEWEST = 40  # number of draws from which one lies beyond each end of a 95 % interval
+MOST_POINTS = 5e7  # most numbers in an array of draws × samples: half a gigabyte
 DRAWS = FileKind("draws", 1, 2**30, "draw them again and save them anew")
 _ATTRIBUTES = {"kind": str, "about": str, "chains": int}
 _ABOUT = {"details": {str: float}, "interrupted": bool, "weighed": bool}
@@ -48,7 +48,7 @@ KINDS = ("bootstrap", "posterior", "normal")
 
 @dataclass(frozen=True, eq=False)
 class Draws(ReadOnly):
-    """Draws of the parameters that are compatible with a fit.
+    """Draws of the parameters of a fit from their distribution.
 
     Attributes
     ----------
@@ -58,7 +58,8 @@ class Draws(ReadOnly):
     values : dict of str to ndarray (m,)
         Draws by name of the parameter, SI units.
     details : dict of str to float
-        Block length and share of refits that converged, or acceptance and autocorrelation time, or seed.
+        Details of a bootstrap (block length, share of refits that converged), a posterior (acceptance, autocorrelation
+        time, steps) or normal draws (seed).
     interrupted : bool
         True if Ctrl-C came before all draws were made.
     chains : int
@@ -79,12 +80,12 @@ class Draws(ReadOnly):
         return len(next(iter(self.values.values())))
 
     def __getitem__(self, name: str) -> Array:
-        """Draws (m,) of a parameter, or of what follows from them (`derived`)."""
+        """Draws (m,) of a parameter, or of a quantity in `derived`."""
         return self.derived[name] if name in self.derived else self.values[self.fit.names[self.fit.index(name)]]
 
     @cached_property
     def derived(self) -> dict[str, Array]:
-        """Draws (m,) of what follows from the parameters, as of ``a - b``, ``k_c``; NaN in draws without it."""
+        """Draws (m,) of quantities that follow from the parameters, such as ``a - b`` and ``k_c``; NaN if undefined."""
         with np.errstate(all="ignore"):
             found: dict[str, Array] = read_only(self.fit.derived_at(self._coordinates))
         return found
@@ -113,19 +114,19 @@ class Draws(ReadOnly):
             )
             lines.append(f"  {one.name}  {drawn.shown()}" + ("" if few else f"   95 %: {drawn.range()}"))
         if few:
-            lines.append(f"! intervals of 95 % need {FEWEST} draws, one beyond each end")
+            lines.append(f"! intervals of 95 % need {FEWEST} draws or more")
         if (worst := max(self.chain_spread, key=self.chain_spread.__getitem__, default=None)) is not None:
             spread, lasting = self.chain_spread[worst], self.details.get("autocorrelation", 0.0)
             if not (spread < MIXED and self.details.get("steps", np.inf) >= FEWEST_TIMES * lasting):
                 lines.append(
                     f"! the chains have not mixed (R-hat {spread:.3g} of {worst}, autocorrelation over {lasting:.3g} "
-                    "steps): these numbers depend on where they began; take more steps"
+                    "steps): these numbers depend on where the chains began; take more steps"
                 )
         return "\n".join(lines)
 
     @cached_property
     def chain_spread(self) -> dict[str, float]:
-        """Split R-hat of each parameter's chains, near 1 where they have mixed; empty for independent draws."""
+        """Split R-hat by name of the parameter, near 1 if its chains have mixed; empty for independent draws."""
         if self.chains < 2:
             return {}
         return {name: spread_of_chains(own.reshape(self.chains, -1)) for name, own in self.values.items()}
@@ -149,7 +150,7 @@ class Draws(ReadOnly):
         write_table(path, DRAWS, xr.Dataset(variables, attrs=attributes), [store.to_dataset(self.fit)])
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw the parameters against each other."""
+        """Plot the draws of the parameters against each other."""
         return draw(self, ax=ax)
 
     @checked(seed=whole(0))
@@ -159,18 +160,18 @@ class Draws(ReadOnly):
         Parameters
         ----------
         samples : bool
-            Whether to compute what belongs to the samples of the records: the groups ``observed_data``,
-            ``log_likelihood`` (of each sample given those before it, with the fit's noise) and
-            ``posterior_predictive``. That takes a number for each draw and sample.
+            True to compute groups with values for each sample of the records: ``observed_data``, ``log_likelihood`` (of
+            each sample given those before it, with the fit's noise) and ``posterior_predictive``. They need much
+            memory: a number for each draw and sample.
         seed : int
-            Of the noise of ``posterior_predictive``.
+            Seed for the noise in ``posterior_predictive``.
 
         Returns
         -------
         arviz.InferenceData, or xarray.DataTree from version 1 of ArviZ on
-            Group ``posterior``, with what follows from the parameters too (``k over k_c``: files take no slash in a
-            name), those of the samples and, where the log probability was computed, ``lp`` in
-            ``sample_stats``.
+            Group ``posterior`` with the parameters and derived quantities (``k over k_c`` in place of ``k/k_c``, as
+            files allow no slash in a name), the groups of the samples and, if the log probability was computed,
+            ``lp`` in ``sample_stats``.
 
         Raises
         ------
@@ -184,11 +185,11 @@ class Draws(ReadOnly):
         return inference_data(values, units, self.chains, statistics=statistics, samples=own)
 
     def _samples(self, seed: int) -> SampleDraws:
-        """Likelihood and prediction of every sample of the records by every draw."""
+        """Likelihood and prediction of every sample of the records for every draw."""
         fit, generator = self.fit, np.random.default_rng(seed)
         if len(self) * fit.samples > MOST_POINTS:
             message = f"{len(self)} draws of {fit.samples} samples are too many numbers for memory"
-            raise NotAvailable(f"{message}; fit a decimated record, draw less, or leave them out (samples=False)")
+            raise NotAvailable(f"{message}; fit a decimated record, take fewer draws, or give samples=False")
         z = self._coordinates
         comparison = fit.comparison
         model = np.concatenate([comparison.model(part)[0] for part in np.array_split(z, -(-len(z) // REFITS_AT_ONCE))])
@@ -211,7 +212,7 @@ def load_draws(path: str | PathLike[str]) -> Draws:
     Raises
     ------
     NotAvailable
-        If the file is not one of ours, is damaged, or cannot be read.
+        If the file was not written by `Draws.save`, is damaged, or cannot be read.
 
     Examples
     --------
@@ -240,7 +241,9 @@ def load_draws(path: str | PathLike[str]) -> Draws:
 
 @checked(count=whole(1, 10**8))
 def normal_draws(fit: Fit, count: int = 1000, seed: int = 0, *, held: Sequence[str] = ()) -> Draws:
-    """Draw parameters from the normal distribution with the covariance of a fit, in its coordinates.
+    """Draws of the parameters of a fit from the normal distribution with its covariance.
+
+    The distribution is normal in the logarithms of positive parameters and in the values of others.
 
     Parameters
     ----------
@@ -248,12 +251,12 @@ def normal_draws(fit: Fit, count: int = 1000, seed: int = 0, *, held: Sequence[s
     count : int
     seed : int
     held : sequence of str, optional
-        Parameters that keep the fit's value where it does not determine them, as those without effect may.
+        Parameters without effect on the answer: if the fit does not determine them, all draws have its value.
 
     Raises
     ------
     NotAvailable
-        If another parameter is not determined, or the search of the fit had not come to its end.
+        If another parameter is not determined, or the search of the fit was stopped before it ended.
 
     Examples
     --------
@@ -266,7 +269,9 @@ def normal_draws(fit: Fit, count: int = 1000, seed: int = 0, *, held: Sequence[s
     fit.check_ended()
     lost = [e.name for e in fit.estimates if not e.determined and e.name not in {fit.names[fit.index(n)] for n in held}]
     if lost:
-        raise NotAvailable(f"the fit does not determine {', '.join(lost)}; fix one of each combination that it names")
+        raise NotAvailable(
+            f"the fit does not determine {', '.join(lost)}; fix a parameter in each undetermined combination"
+        )
     covariance = np.where(np.isfinite(fit.covariance), fit.covariance, 0.0)
     generator = np.random.default_rng(seed)
     z = generator.multivariate_normal(fit.coordinates, covariance, size=count, method="eigh")
@@ -283,25 +288,25 @@ def bootstrap(
     fit: Fit, count: int = 1000, kind: str = "auto", *, block: int | None = None, seed: int = 0,
     threads: int | None = None, progress: bool | None = None,
 ) -> Draws:  # fmt: skip
-    """Refit the model plus resampled residuals, many times, each from the fit's own minimum.
+    """Draws of the parameters by bootstrap: fits to the model plus resampled residuals.
 
-    What is uncertain in the loading found in the records (levels of rate, a servo) is drawn from its errors.
+    The loading that was found in the records (rates, response of a servo) also varies between draws, by its errors.
 
     Parameters
     ----------
     fit : Fit
     count : int
-        Refits.
+        Number of refits, each of which starts at the minimum of the fit.
     kind : str
-        ``block``: residuals in blocks, which keeps their correlation; ``residual``: one by one; ``auto``: blocks where
-        the fit takes residuals as correlated.
+        ``block``: residuals are resampled in blocks, which keeps their correlation; ``residual``: one by one; ``auto``:
+        in blocks if the fit has correlated residuals.
     block : int, optional
-        Samples in a block; ten times as many as are worth one independent sample unless given.
+        Number of samples in a block; by default ten times as many as are worth one independent sample.
     seed : int
     threads : int, optional
     progress : bool, optional
-        Whether to show a progress bar; on a terminal unless given. Ctrl-C returns the refits that are done
-        (`Draws.interrupted`), where there are any.
+        True to show a progress bar; by default only on a terminal. Ctrl-C returns the refits done so far
+        (`Draws.interrupted`), if there are any.
 
     Returns
     -------
@@ -310,7 +315,7 @@ def bootstrap(
     Raises
     ------
     NotAvailable
-        If the search of the fit had not come to its end.
+        If the search of the fit was stopped before it ended.
 
     Examples
     --------
@@ -360,7 +365,11 @@ def bootstrap(
 
 
 def block_length(fit: Fit, record: int, worth: float, kind: str = "block", block: int | None = None) -> int:
-    """Number of samples in a block that is worth so many independent ones: those further apart are nearly so."""
+    """Number of samples in a block, for the given kind of bootstrap.
+
+    Unless `block` is given, it is as long as `worth` samples that are independent, so that blocks are nearly
+    independent of each other.
+    """
     noise = fit.noise[record]
     size = len(fit.part(fit.residuals, record))
     if kind == "residual" or (kind == "auto" and not noise.correlated):
@@ -370,14 +379,14 @@ def block_length(fit: Fit, record: int, worth: float, kind: str = "block", block
 
 
 def _scale_of_blocks(residuals: Array, noise: Noise, block: int) -> float:
-    """Factor by which means of blocks scatter as the noise of a fit; its parameters took some of that out."""
+    """Factor for residuals that gives means of blocks the variance of the noise; fitted parameters had reduced it."""
     sums = np.cumsum(np.concatenate([[0.0], residuals - residuals.mean(), residuals[:block] - residuals.mean()]))
     scatter = float(np.var(sums[block:-1] - sums[: -block - 1])) / block**2
     return float(np.sqrt(noise.variance_of_mean(block) / scatter)) if scatter > 0 else 1.0
 
 
 def _resampled(residuals: Array, block: int, many: int, generator: np.random.Generator) -> Array:
-    """Residuals resampled in blocks from random places, (many, n); blocks continue from the end at the start."""
+    """Residuals (many, n) resampled in blocks that begin at random; a block at the end continues at the start."""
     size = len(residuals)
     starts = generator.integers(0, size, size=(many, -(-size // block)))
     places = (starts[:, :, None] + np.arange(block)).reshape(many, -1)[:, :size] % size
@@ -386,18 +395,18 @@ def _resampled(residuals: Array, block: int, many: int, generator: np.random.Gen
 
 @checked(steps=whole(1, 10**9), walkers=whole(1, 10**6))
 def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, threads: int | None = None) -> Draws:
-    """Sample the posterior with emcee.
+    """Draws of the parameters from their posterior, sampled with emcee.
 
-    The likelihood is that of the sum of squares. Where residuals are correlated, the coordinates are stretched about
-    the minimum so that its curvature there agrees with the fit's covariance (Ribatet, Cooley & Davison 2012); its
-    shape further out remains that of the sum of squares. Priors are flat in the logarithm of parameters that must be
-    positive, else in the parameter, within what the records can show.
+    The likelihood follows from the sum of squares. If residuals are correlated, the coordinates are stretched about
+    the minimum so that the curvature there agrees with the fit's covariance (Ribatet, Cooley & Davison 2012); further
+    out, the shape remains that of the sum of squares. Priors are flat in the logarithms of positive parameters and in
+    the values of others, within the bounds of the fit.
 
     Parameters
     ----------
     fit : Fit
     steps : int
-        Of every walker; the first third is left out.
+        Number of steps of every walker; the first third is discarded.
     walkers : int
     seed : int
     threads : int, optional
@@ -405,7 +414,7 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     Raises
     ------
     NotAvailable
-        If emcee is not installed, or the search of the fit had not come to its end.
+        If emcee is not installed, or the search of the fit was stopped before it ended.
 
     Examples
     --------
@@ -447,7 +456,7 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
 
 
 def _stretch(fit: Fit) -> Array:
-    """Linear map (p, p) of coordinates about the minimum that adapts the sum of squares to the fit's covariance."""
+    """Linear map (p, p) of the distance from the minimum that makes the sum of squares agree with the covariance."""
     size = len(fit.space)
     if not fit.correlated:
         return np.eye(size)

@@ -15,17 +15,17 @@ from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
 
-APART = 3.0  # length of blocks left out, in samples that are worth one independent one
+APART = 3.0  # length of the blocks left out, in numbers of correlated samples that are worth an independent one
 
 
 @dataclass(frozen=True, eq=False)
 class CrossValidation(ReadOnly):
-    """Predictions of samples that were left out.
+    """Errors in the prediction of samples that were left out of a fit.
 
     Attributes
     ----------
     residuals : ndarray (n,)
-        Data less prediction, each sample predicted by the fit that left it out; weighted as the fit is.
+        Data minus prediction by the fit that left the sample out, weighted as in the fit.
     fold : ndarray of int (n,)
         Index of the fold of each sample; samples of one fold are left out together.
     block : int
@@ -53,7 +53,7 @@ class CrossValidation(ReadOnly):
     def __str__(self) -> str:
         return (
             f"samples left out, {int(self.fold.max()) + 1} folds of blocks of {self.block}: predicted to "
-            f"{self.rms:.4g}, against {self.seen:.4g} where all were seen"
+            f"{self.rms:.4g}, against {self.seen:.4g} in the fit to all samples"
         )
 
 
@@ -61,10 +61,11 @@ class CrossValidation(ReadOnly):
 def cross_validate(
     fit: Fit, folds: int = 8, *, block: int | None = None, threads: int | None = None
 ) -> CrossValidation:
-    """Leave each part of the samples out of the fit in turn, and predict it.
+    """Prediction errors of samples that are left out of the fit, one part after the other.
 
-    A part consists of every so-many-th block of all records. Blocks are longer than the correlation of the noise, so
-    that neighbours do not reveal samples left out; and short enough that every step of the loading remains in the fit.
+    With 8 folds, a part consists of every 8th block of successive samples. Blocks are longer than the correlation of
+    the noise, so that neighbours do not reveal the samples left out, and short enough that every step of the loading
+    remains in the fit.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def cross_validate(
     folds : int
         Number of parts.
     block : int, optional
-        Samples in a block; three times as many as are worth one independent sample unless given.
+        Number of samples in a block; by default three times as many as are worth one independent sample.
     threads : int, optional
 
     Raises

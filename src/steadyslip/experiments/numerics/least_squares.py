@@ -1,6 +1,6 @@
 """Nonlinear least squares for many problems at once: Levenberg–Marquardt within bounds.
 
-Each problem has its own starting point, data (bootstrap) or fixed values (profiles). Constants without a stated bound
+Problems differ in their starting points, data (bootstrap) or fixed values (profiles). Constants without a stated reason
 were chosen by trial; they trade iterations against the risk of ending too early.
 """
 
@@ -14,11 +14,11 @@ import numpy as np
 from steadyslip.core.arrays import Array
 
 Residuals = Callable[[Array, Array], tuple[Array, Array]]
-"""Function of coordinates (m, p) and problem indices (m,) to residuals (m, n), data less model, and the derivatives
-(m, p, n) of the model."""
+"""Function of coordinates (m, p) and problem indices (m,) that returns residuals (m, n), data minus model, and the
+derivatives (m, p, n) of the model."""
 
 CONVERGED = 1e-10  # predicted relative decrease of the sum of squares at which a problem has converged
-STALLED = 1e-7  # the same where no step succeeds any more: smaller decreases are lost in rounding of the model
+STALLED = 1e-7  # the same limit once no step succeeds any more: smaller decreases are lost in the model's rounding
 KINK = 1e-9  # a failed step with a smaller predicted relative decrease ends the problem: it is at a kink
 MAX_DAMPING_FACTOR = 64.0  # largest factor by which the damping grows after a failed step; it doubles with each failure
 PARALLEL = 0.95  # cosine of the angle between successive steps above which they count as parallel
@@ -27,11 +27,11 @@ HOPE = 2.0  # ends of a rough search above this multiple of the best sum of squa
 MERGE_DISTANCE = 0.02  # largest difference in any coordinate (2 % of a logarithmic parameter) of equal minima
 SAME_SSQ = 1e-2  # relative difference of sums of squares between ends at one minimum of a rough search
 PROGRESS_ITERATIONS = 10  # iterations over which the progress of a problem is averaged
-LEAST_PROGRESS = (
-    3e-7  # relative decrease in `PROGRESS_ITERATIONS` iterations below which a problem ends: it follows a flat valley
-)
-LEAST_PROMISE = 0.1  # share of the way to a known sum of squares; searches that got there predicted .4 or more
-LOST = 4.0  # multiple of a known sum of squares that searches which get there are below after `PROGRESS_ITERATIONS`
+LEAST_PROGRESS = 3e-7
+"""A problem in a flat valley ends below this relative decrease in `PROGRESS_ITERATIONS` iterations."""
+LEAST_PROMISE = 0.1
+"""Least predicted decrease as a share of the distance to a known sum of squares; successful searches had .4 or more."""
+LOST = 4.0  # a search above this multiple of a known sum of squares after `PROGRESS_ITERATIONS` never gets there
 MAX_SSQ = 1e100  # sums of squares above count as infinite; their products would overflow
 DAMPING_FAR, DAMPING_NEAR = 1e-2, 1e-6  # initial damping, relative to the curvature: far from a minimum, and near one
 MAX_STEP = 2.0  # largest step in any coordinate: a factor exp(2) of a logarithmic parameter
@@ -123,11 +123,12 @@ def minimise(
     tolerance : float
         Predicted relative decrease of the sum of squares at which a problem has converged.
     race : int
-        If positive, all problems are starts of one: once `race` of them have converged to the best minimum or are one
-        step away from it, those that predict no better end stop; once one has, those too slow to get there stop.
+        If positive, all problems are starts of the same problem. Once a start has converged, starts that are too slow
+        to reach its sum of squares stop. Once `race` starts have converged to the best minimum, or are one step away
+        from it, starts that predict no better minimum stop.
     known : float
-        Sum of squares that this one problem is known to reach from elsewhere: starts too slow to get there stop, and
-        without a race those that predict to get hardly nearer.
+        Sum of squares that the problem is known to reach from another start: starts that are too slow to reach it stop;
+        so do, without a race, starts whose predicted decrease is small compared with the distance to it.
     callback : callable, optional
         Called after every iteration with the `Minima` so far.
     stop : callable, optional
@@ -225,9 +226,9 @@ def _near(coordinates: Array, places: Array) -> Array:
 
 
 def _stretch(step: Array, last: Array, scale: Array) -> Array:
-    """Factors (m,) by which steps may be lengthened where successive steps are parallel.
+    """Factors (m,) by which to lengthen steps that are parallel to the `last` ones; 1 for other steps.
 
-    Where residuals are large, steps shrink by a constant factor q: their geometric series sums to step / (1 - q).
+    If residuals are large, steps shrink by a constant factor q; the sum of this geometric series is step / (1 - q).
     """
     both, own, other = (np.einsum("mi,mi,mi->m", a, b, scale) for a, b in ((step, last), (step, step), (last, last)))
     with np.errstate(all="ignore"):
@@ -236,9 +237,9 @@ def _stretch(step: Array, last: Array, scale: Array) -> Array:
 
 
 def _normal(r: Array, jacobian: Array) -> tuple[Array, Array, Array]:
-    """Sums of squares (m,), JᵀJ (m, p, p) and Jᵀr (m, p); r is data less model, J the derivatives of the model.
+    """Sums of squares (m,), JᵀJ (m, p, p) and Jᵀr (m, p); r is data minus model, J the derivatives of the model.
 
-    The sum is inf where the model could not be computed, or is too large for its products to be represented.
+    The sum of squares is inf if the model could not be computed, or if products would overflow.
     """
     with np.errstate(all="ignore"):
         normal, gradient = np.matmul(jacobian, jacobian.transpose(0, 2, 1)), np.matmul(jacobian, r[:, :, None])[:, :, 0]
@@ -247,7 +248,7 @@ def _normal(r: Array, jacobian: Array) -> tuple[Array, Array, Array]:
 
 
 def _steps(normal: Array, gradient: Array, free: Array, damping: Array, scale: Array) -> tuple[Array, Array]:
-    """Decrease of the sum of squares (m,) that the linearised problem predicts undamped; damped steps (m, p)."""
+    """Decrease (m,) of the sum of squares that the linearised problem predicts undamped, and damped steps (m, p)."""
     diagonal = np.einsum("mii->mi", normal)
     extra = np.stack([
         np.broadcast_to(1e-12 * np.max(diagonal, axis=1, keepdims=True), diagonal.shape),
@@ -266,6 +267,6 @@ def _steps(normal: Array, gradient: Array, free: Array, damping: Array, scale: A
 
 
 def _expected(normal: Array, gradient: Array, steps: Array) -> Array:
-    """Decrease of the sum of squares, (k, m), that the linearised problem predicts for steps (k, m, p)."""
+    """Decrease (k, m) of the sum of squares that the linearised problem predicts for steps (k, m, p)."""
     fall = gradient - 0.5 * np.matmul(normal, steps[..., None])[..., 0]
     return np.asarray(2 * np.einsum("kmi,kmi->km", fall, steps))

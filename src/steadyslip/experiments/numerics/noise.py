@@ -1,7 +1,7 @@
 """Autocorrelation of residuals, its effect on the errors of a fit, and a test of residuals for structure.
 
-Residuals of real records are correlated from sample to sample (machine, drift, filters), which makes errors that
-take them for independent several times too small. Their autocovariance is described by an autoregressive process.
+Residuals of real records are correlated from sample to sample (machine, drift, filters). Errors computed for
+independent residuals would be several times too small. The autocovariance is described by an autoregressive process.
 """
 
 from __future__ import annotations
@@ -19,25 +19,26 @@ from scipy.linalg import matmul_toeplitz, solve_toeplitz
 from steadyslip.core.arrays import Array
 from steadyslip.core.results import ReadOnly
 
-SIGNIFICANT = 4.0  # lag-1 autocorrelation, in standard errors of that of white noise, that is not by chance
+SIGNIFICANT = 4.0  # lag-1 autocorrelation that is not by chance, in standard errors for white noise
 NOTICED, NOTICED_CHANCE = 1.0, 0.05
-"""The same (only above 0: slow noise adds up), and probability of correlation over all lags, from which noise is
-described as correlated. Rms z of 150 linear fits of 600 samples: .98 to 1.05 for white noise, 1.12 with slow noise of a
-quarter of its size, 1.28 at 2 and .01."""
+"""Noise is described as correlated from this positive lag-1 autocorrelation (in standard errors for white noise), or
+below this probability of the correlation over all lags for white noise. With these limits, the rms of deviation over
+error in 150 linear fits of 600 samples was .98 to 1.05 for white noise and 1.12 with slow noise of a quarter of its
+size; with 2 and .01, 1.28."""
 MAX_ORDER = 40  # largest order of the autoregression; above about a tenth of the samples it is not determined
-LAGS = 20  # of tests for correlation, in samples; a tenth of the samples, if that is less
-MIN_CHANCE = 1e-3  # probability of such a test below which innovations of the simple noise model are not white
+LAGS = 20  # most lags in tests for correlation, in samples; at most a tenth of the samples
+MIN_CHANCE = 1e-3  # innovations of the simple noise model are not white below this probability in such a test
 STRUCTURE = 1e-3  # probability of the whiteness test below which residuals have structure
-FIRST_GUESSES = ((0.5, 0.0), (0.9, 0.7), (0.98, 0.7), (0.0, 0.3))  # decay and average from which they are sought
-LONGEST = 0.05  # correlation over a record that is sought at most: noise cannot be told from a level beyond
-CURVATURE_STEP = 0.05  # of differences of the likelihood, in inverse hyperbolic tangents of decay and average
-LEAST_CURVATURE = 0.25  # of their log-likelihood: where it is flatter they vary by 2, to where tanh hardly changes
-FITTED_RANK = 1e-6  # singular values of derivatives, scaled, below which they are combinations of each other
-VANISHED = 1e-30  # powers below it are taken as 0: they do not count, and denormal numbers are a hundred times slower
+FIRST_GUESSES = ((0.5, 0.0), (0.9, 0.7), (0.98, 0.7), (0.0, 0.3))  # candidates for the starting decay and average
+LONGEST = 0.05  # largest correlation between the ends of a record: slower noise looks like a constant
+CURVATURE_STEP = 0.05  # step of finite differences of the likelihood, in artanh of decay and average
+LEAST_CURVATURE = 0.25  # least curvature of the likelihood, for a deviation of 2 at most: beyond, tanh is flat
+FITTED_RANK = 1e-6  # derivatives are linearly dependent below this ratio of singular values
+VANISHED = 1e-30  # smaller powers are set to 0: they have no effect, and denormal numbers are a hundred times slower
 TAIL = 1e-4  # the autocovariance is continued until it is below this share of the variance
 
 _RECENT: deque[tuple[bytes, Array]] = deque(maxlen=8)
-"""Residuals and rows (a digest) that `first_order` was asked of last, and places found: a fit asks of many twice."""
+"""Recent calls of `first_order` (digest of the arguments) and their optima: a fit describes most residuals twice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,7 @@ class Noise(ReadOnly):
     innovation : float
         Variance of the white noise that drives the autoregression.
     covariance : ndarray
-        Autocovariance at lags 0, 1, ... samples; its mean over all noise that is likely, not that of the likeliest.
+        Autocovariance at lags 0, 1, ... samples, as mean over all likely parameters of the noise.
     """
 
     lag1: float
@@ -78,7 +79,7 @@ class Noise(ReadOnly):
         return float(own @ worth) / count
 
     def spread(self, rows: Array) -> Array:
-        """Product rows · C · rowsᵀ, (p, p), for rows (p, n); C is the covariance matrix (n, n) of the samples."""
+        """Product rows · C · rowsᵀ (p, p) for rows (p, n), with the covariance matrix C (n, n) of the samples."""
         if not len(self.coefficients):
             return np.asarray(self.covariance[0] * rows @ rows.T)
         column = np.zeros(rows.shape[1])
@@ -87,7 +88,7 @@ class Noise(ReadOnly):
         return np.asarray(rows @ matmul_toeplitz(column, rows.T))
 
     def log_density(self, rows: Array) -> Array:
-        """Logarithm of the probability density of each value of rows (m, n), given those before it in its row."""
+        """Logarithm (m, n) of the probability density of each value in rows (m, n), given the values before it."""
         after = np.array(rows, dtype=float)
         variance = np.full(rows.shape[1], self.innovation)
         order = len(self.coefficients)
@@ -97,16 +98,16 @@ class Noise(ReadOnly):
         return np.asarray(-0.5 * (after**2 / variance + np.log(2 * np.pi * variance)))
 
     def drawn(self, many: int, count: int, generator: np.random.Generator) -> Array:
-        """Random rows of this noise, (many, count)."""
+        """Simulated noise (many, count)."""
         from scipy.signal import lfilter
 
-        first = len(self.covariance) if len(self.coefficients) else 0  # by then the beginning is forgotten
+        first = len(self.covariance) if len(self.coefficients) else 0  # discarded: the filter starts from zero
         pushes = np.sqrt(self.innovation) * generator.standard_normal((many, first + count))
         return np.asarray(lfilter([1.0], np.concatenate([[1.0], -self.coefficients]), pushes)[:, first:])
 
 
 def white(residuals: Array, free: int = 0) -> Noise:
-    """Noise model that takes the residuals (n,) as independent, after `free` parameters were fitted to them."""
+    """Noise model of independent residuals (n,), after a fit of `free` parameters."""
     variance = float(np.sum(residuals**2) / max(len(residuals) - free, 1))
     return Noise(lag_one(residuals), False, np.empty(0), variance, np.array([variance]))
 
@@ -114,8 +115,8 @@ def white(residuals: Array, free: int = 0) -> Noise:
 def lasting(values: Array) -> float:
     """Lag-1 autocorrelation (0 to 0.99) of the noise in values (n,) that also vary slowly.
 
-    It follows from differences over one and over two samples: noise whose correlation falls as ρ**lag has
-    differences of variance 2σ²(1 - ρ) and 2σ²(1 - ρ²).
+    It follows from differences over one and over two samples: noise with correlation ρ**lag has differences of variance
+    2σ²(1 - ρ) and 2σ²(1 - ρ²).
     """
     one, two = (float(np.median(np.abs(values[k:] - values[:-k]))) for k in (1, 2))
     return float(np.clip((two / one) ** 2 - 1.0, 0.0, 0.99)) if one > 0 else 0.0
@@ -152,10 +153,10 @@ class FirstOrder:
     ----------
     decay, average : float
     variance : float
-        Of the innovations e.
+        Variance of the innovations e.
     innovations : ndarray (n,)
     alternatives : tuple of (decay, average, variance)
-        Other noise that may have made the residuals, whose mean is that over what is likely.
+        Other likely parameters; the mean over them approximates the mean over the likelihood.
     """
 
     decay: float
@@ -166,16 +167,16 @@ class FirstOrder:
 
     @property
     def coefficients(self) -> Array:
-        """Coefficients of the autoregression that is the same noise, until they are below `TAIL`."""
+        """Coefficients of the equivalent autoregression, until they are below `TAIL`."""
         first, theta = self.decay - self.average, self.average
         count = np.log(TAIL / abs(first)) / np.log(abs(theta)) if abs(first) > TAIL and theta else 0.0
         return np.asarray(first * theta ** np.arange(min(int(count) + 1, len(self.innovations) - 1)))
 
     def mean_covariance(self, n: int) -> Array:
-        """Mean autocovariance of the alternatives; with the likeliest alone errors come out too small.
+        """Mean autocovariance of the alternatives, at lags 0, 1, ...; errors from the best parameters are too small.
 
-        Variances computed from few correlation times scatter, and the mean square of deviations over standard errors
-        is the larger the more they do.
+        A record of few correlation times determines the variance of the noise poorly, and an uncertain variance widens
+        the distribution of deviations over standard errors.
         """
         each = [replace(self, decay=d, average=a, variance=v).covariance(n) for d, a, v in self.alternatives]
         found = np.zeros(max(map(len, each)))
@@ -194,11 +195,11 @@ class FirstOrder:
 
 
 def first_order(residuals: Array, rows: Array | None = None) -> FirstOrder:
-    """Fit white noise plus a first-order autoregression to residuals (n,) by restricted maximum likelihood.
+    """White noise plus a first-order autoregression, fitted to residuals (n,) by restricted maximum likelihood.
 
-    `rows`, (p, n), are the derivatives in parameters that were fitted to the record: these took slow noise out of the
-    residuals, which the restricted likelihood (Patterson & Thompson 1971) allows for. What the autoregression was
-    before the first sample is one parameter more.
+    `rows` (p, n) are the derivatives by the parameters that were fitted to the record. The fit removed slow noise from
+    the residuals, which the restricted likelihood (Patterson & Thompson 1971) takes into account. The value of the
+    autoregression before the first sample is one more parameter.
     """
     from scipy.linalg.lapack import dpotrf
     from scipy.optimize import minimize
@@ -211,7 +212,7 @@ def first_order(residuals: Array, rows: Array | None = None) -> FirstOrder:
     freedom, limit = n - len(stack) + 1, LONGEST ** (1 / n)
 
     def left(x: Array) -> tuple[float, float, float, Array, float]:
-        """Decay, average, variance and innovations at a place, and minus twice the log-likelihood."""
+        """Decay, average, variance and innovations at `x` (artanh of decay and average); minus twice log-likelihood."""
         decay, average = limit * math.tanh(x[0]), limit * math.tanh(x[1])
         through = lfilter([1.0, -decay], [1.0, -average], stack, axis=1)
         seen = n if abs(average) > VANISHED ** (1 / n) else max(math.ceil(math.log(VANISHED, abs(average) or 0.1)), 1)
@@ -236,9 +237,10 @@ def first_order(residuals: Array, rows: Array | None = None) -> FirstOrder:
 
 
 def _likely(deviance: Callable[[Array], float], best: Array) -> list[Array]:
-    """Places whose mean is that over a normal distribution: minus twice its log-density is `deviance`, least at `best`.
+    """Points of a cubature rule for a normal distribution: means over the points are means over the distribution.
 
-    Two to each side along its axes, the rule of third degree (Stroud 1957).
+    Minus twice the log-density is `deviance`, approximated by a parabola at its minimum `best`. There are two points on
+    each axis of the distribution, one on each side (rule of third degree, Stroud 1957).
     """
     count, steps, middle = len(best), CURVATURE_STEP * np.eye(len(best)), deviance(best)
 
@@ -256,9 +258,9 @@ def _likely(deviance: Callable[[Array], float], best: Array) -> list[Array]:
 
 
 def describe(residuals: Array, free: int = 0, always: bool = False, rows: Array | None = None) -> Noise:
-    """Describe the noise in residuals: white, white plus a first-order autoregression, or an autoregression.
+    """Noise model of residuals: white, white plus a first-order autoregression, or an autoregression.
 
-    The last, whose order is Akaike's, is for residuals in which the second leaves correlation.
+    The autoregression, whose order minimises Akaike's criterion, is used only if the second model leaves correlation.
 
     Parameters
     ----------
@@ -266,9 +268,9 @@ def describe(residuals: Array, free: int = 0, always: bool = False, rows: Array 
     free : int
         Number of parameters that were fitted to the record.
     always : bool
-        Take the residuals as correlated even if neither lag 1 nor all lags together show it.
+        True to treat the residuals as correlated even if neither lag 1 nor all lags together show it.
     rows : ndarray (p, n), optional
-        Derivatives in these parameters.
+        Derivatives of the model by the fitted parameters.
     """
     from scipy.stats import chi2
 
@@ -301,7 +303,7 @@ def describe(residuals: Array, free: int = 0, always: bool = False, rows: Array 
 
 
 def _covariance(gamma: Array, phi: Array, n: int) -> Array:
-    """Autocovariance of an autoregression with coefficients `phi`, continued until it has fallen below `TAIL`."""
+    """Autocovariance of an autoregression: `gamma` at the first lags, continued by coefficients `phi` to `TAIL`."""
     found = list(gamma[: len(phi) + 1])
     limit = TAIL * gamma[0]
     while len(found) < n and np.max(np.abs(found[-len(phi) :])) > limit:
@@ -311,15 +313,15 @@ def _covariance(gamma: Array, phi: Array, n: int) -> Array:
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Result of the test of one record or several.
+    """Result of the test for structure in the residuals of one record or several.
 
     Attributes
     ----------
     statistic : float
-        Ljung and Box's (1978) Q of the residuals, less what white noise plus a first-order autoregression explains,
-        and McLeod and Li's (1983) of their squares, added up: the latter sees misfit that gathers at some times.
+        Ljung and Box's (1978) Q of the innovations of white noise plus a first-order autoregression, plus McLeod and
+        Li's (1983) Q of their squares, which shows misfit that gathers at some times.
     degrees : int
-        Of freedom of its chi-squared distribution, which is also its mean if there is no structure.
+        Degrees of freedom of its chi-squared distribution, which is also its mean if there is no structure.
     """
 
     statistic: float
@@ -334,7 +336,7 @@ class Whiteness:
 
 
 def whiteness(residuals: Iterable[Array]) -> Whiteness:
-    """Whiteness of the residuals (n,) of all records: portmanteau statistic and its degrees of freedom."""
+    """Test for structure in the residuals (n,) of all records: portmanteau statistic and its degrees of freedom."""
     statistic, degrees = 0.0, 0
     for own in residuals:
         lags = min(LAGS, len(own) // 10)

@@ -1,9 +1,10 @@
-"""Estimates of several experiments as members of one population: normal in coordinates, covariance unknown.
+"""Hierarchical normal model of the estimates of several experiments, with unknown covariance between experiments.
 
-Experiment j has true coordinates θ_j = X_j β + N(0, Σ) and says of some of them z_j = θ_j + N(0, C_j). The mean β is
-integrated out with a flat prior. The spreads s, roots of the diagonal of Σ, have priors exp(−s²/2)/√s, and correlation
-matrices R the density |R|² (Lewandowski, Kurowicka & Joe 2009); both are sampled. β and θ follow from them exactly
-(Gelman et al. 2013, Bayesian Data Analysis, ch. 5). Samples are drawn by emcee, which only this file imports.
+Experiment j has true coordinates θ_j = X_j β + N(0, Σ), some of which are estimated as z_j = θ_j + N(0, C_j). The mean
+β is integrated out with a flat prior. The spreads s, roots of the diagonal of Σ, have priors exp(−s²/2)/√s, and
+correlation matrices R the density |R|² (Lewandowski, Kurowicka & Joe 2009); both are sampled. For each sample, β and θ
+have normal distributions that are known exactly (Gelman et al. 2013, Bayesian Data Analysis, ch. 5). Samples are drawn
+by emcee, which only this file imports.
 """
 
 from __future__ import annotations
@@ -21,12 +22,13 @@ MIN_LOG_SPREAD = -16.0  # lower bound of ln(spread / prior scale): spreads below
 WALKERS, BURN = 40, 250  # least number of walkers, and steps discarded at the start; chosen by trial, for time
 THINNING = 20  # steps between the draws that are kept of a walker, about its autocorrelation time
 MIN_STEPS = 350  # least number of steps after the discarded ones, for a usable autocorrelation time
-FEWEST_TIMES = 20  # autocorrelation times that walkers need, of which each has few draws; chosen by trial
-MOST_ROUNDS = 3  # rounds of steps, each as long as all before, until there are as many
-ALIKE = 3.0  # exponent of the determinant of correlations in their prior, plus 1: with 1, spreads came out too large
+FEWEST_TIMES = 20  # autocorrelation times that the steps must span, as each walker has few draws; chosen by trial
+MOST_ROUNDS = 3  # most rounds of further steps, each of which doubles their number, until they span `FEWEST_TIMES`
+ALIKE = 3.0  # exponent η of the prior |R|^(η − 1) of correlation matrices: with η = 1, spreads were too large
 SMALL = 0.5
-"""Power of a spread in its prior per e-fold. With 1, a half-normal density, medians of five rocks came out 15 to 26 %
-too large and 95 % intervals held .90 to .93 of 500, nearly all others above the truth; 0 has no posterior."""
+"""Power of a spread in the density of its logarithm. With 1 (half-normal prior), medians of the spread of five rocks
+were 15 to 26 % too large and 95 % intervals contained the truth in .90 to .93 of 500 cases; with 0 the posterior cannot
+be normalised."""
 MOST_BEND = 8.0  # largest |artanh| of a partial correlation: closer to 1 than 1e-6 counts as 1
 
 
@@ -60,22 +62,22 @@ class ExperimentEstimate:
 
 @dataclass(frozen=True, eq=False)
 class Pooled:
-    """Draws from the posterior of a population.
+    """Draws from the posterior of a population, m of them, in p coordinates.
 
     Attributes
     ----------
     mean : ndarray (m, p, q)
-        β: at mean conditions, then per unit of each condition.
+        β: value at mean conditions, then slope with each condition.
     root : ndarray (m, p, p)
         Lower triangular root L of Σ = LLᵀ.
-    members : ndarray (m, j, p)
+    members : ndarray (m, experiments, p)
         θ of every experiment.
     time : float
-        Longest autocorrelation time of the covariance's coordinates, steps.
+        Longest autocorrelation time of the chains, in steps.
     steps : int
-        Steps of each walker.
+        Number of steps of each walker.
     chains : int
-        Walkers that the draws belong to, one after another and equally long.
+        Number of walkers; the draws of one follow those of another, equally many of each.
     """
 
     mean: Array
@@ -92,21 +94,30 @@ class Pooled:
 
     @property
     def mixed(self) -> bool:
-        """True if walkers made steps enough to forget where they began."""
+        """True if the chains are long enough, in autocorrelation times, to be independent of their starting points."""
         return self.steps >= FEWEST_TIMES * self.time
 
     def another(self, seed: int) -> Array:
-        """Coordinates (m, p) of an experiment that is not among them, at mean conditions."""
+        """Coordinates (m, p) of a new experiment at mean conditions."""
         noise = np.random.default_rng(seed).standard_normal((*self.root.shape[:2], 1))
         return np.asarray(self.mean[:, :, 0] + (self.root @ noise)[:, :, 0])
 
 
 def log_evidence(experiments: list[ExperimentEstimate], covariance: Array) -> tuple[Array, Array, Array]:
-    """Log marginal likelihood (m,) for covariances (m, p, p); precision (m, p q, p q) and mean (m, p q) of β then."""
+    """Log marginal likelihood (m,) for covariances (m, p, p), and the distribution of β for each of them.
+
+    Returns
+    -------
+    log_likelihood : ndarray (m,)
+    precision : ndarray (m, p q, p q)
+        Inverse of the covariance of β.
+    mean : ndarray (m, p q)
+        Mean of β.
+    """
     count, size = covariance.shape[:2]
     width = size * len(experiments[0].design)
     precision, pull, rest = np.zeros((count, width, width)), np.zeros((count, width)), np.zeros(count)
-    for many in {len(one.indices) for one in experiments} - {0}:  # those that determine equally many, together
+    for many in {len(one.indices) for one in experiments} - {0}:  # experiments with equally many estimates at once
         alike = [one for one in experiments if len(one.indices) == many]
         seen = np.array([one.indices for one in alike])
         slopes = np.array([one.slopes(size) for one in alike])
@@ -126,7 +137,7 @@ def log_evidence(experiments: list[ExperimentEstimate], covariance: Array) -> tu
 
 
 def pooled(experiments: list[ExperimentEstimate], size: int, scale: Array, count: int, seed: int) -> Pooled:
-    """Draw covariances, means and members of a population from their posterior, by affine-invariant MCMC.
+    """Draws of covariance, mean and experiments of a population from their posterior, by affine-invariant MCMC.
 
     Parameters
     ----------
@@ -134,9 +145,9 @@ def pooled(experiments: list[ExperimentEstimate], size: int, scale: Array, count
     size : int
         Number of coordinates.
     scale : ndarray (p,)
-        Of the priors of the spreads.
+        Scales of the priors of the spreads.
     count : int
-        Draws, at least: as many of every walker.
+        Least number of draws; it is rounded up to equally many of every walker.
     seed : int
 
     Raises
@@ -150,7 +161,7 @@ def pooled(experiments: list[ExperimentEstimate], size: int, scale: Array, count
         logs, bends = u[:, :size], u[:, size:]
         inside = np.all((logs > MIN_LOG_SPREAD) & (logs < 4.0), axis=1) & np.all(np.abs(bends) < MOST_BEND, axis=1)
         if np.any(inside):
-            share = np.exp(logs[inside])  # of the prior's scale
+            share = np.exp(logs[inside])  # spreads in units of the prior's scale
             root = (scale * share)[:, :, None] * correlation_root(bends[inside], size)
             prior = np.sum(SMALL * logs[inside] - 0.5 * share**2, axis=1) + log_prior_of_correlation(
                 bends[inside], size
@@ -186,7 +197,7 @@ def correlation_root(bends: Array, size: int) -> Array:
     """Lower triangular roots (m, p, p) of correlation matrices, from artanh of partial correlations (m, p(p−1)/2)."""
     root = np.zeros((len(bends), size, size))
     partial = np.tanh(bends)
-    left = np.ones((len(bends), size))  # of the unit length of each row
+    left = np.ones((len(bends), size))  # squared length that is left of each row, which has length 1
     k = 0
     for i in range(size):
         for j in range(i):
@@ -200,14 +211,15 @@ def correlation_root(bends: Array, size: int) -> Array:
 def log_prior_of_correlation(bends: Array, size: int) -> Array:
     """Logarithm (m,) of the density of artanh of partial correlations, if matrices R have the density |R|^(η − 1).
 
-    Partial correlation j of a row then has (1 − r²)^(η − 1 + (p − 1 − j)/2), j from 1 (Lewandowski et al. 2009).
+    The density of partial correlation j of a row is then (1 − r²)^(η − 1 + (p − 1 − j)/2), with j from 1 (Lewandowski
+    et al. 2009).
     """
     power = np.array([ALIKE - 1 + 0.5 * (size + 1 - j) for i in range(size) for j in range(1, i + 1)])
     return np.asarray(-2 * np.log(np.cosh(bends)) @ power)
 
 
 def _initial_spreads(experiments: list[ExperimentEstimate], size: int, scale: Array) -> Array:
-    """Starting values of the spreads (p,): standard deviations of the estimates, else 0.3 of the prior scale."""
+    """Starting values (p,) of the spreads: standard deviation of the estimates, or else 0.3 of the prior's scale."""
     found = np.array(0.3 * scale)
     for p in range(size):
         values = [float(one.values[np.flatnonzero(one.indices == p)[0]]) for one in experiments if p in one.indices]
@@ -227,7 +239,7 @@ def _conditional_draws(
     noise = generator.standard_normal((count, precision.shape[1], 1))
     mean = (best + np.linalg.solve(upper, noise)[:, :, 0]).reshape(count, size, -1)
     members = np.empty((count, len(experiments), size))
-    for j, one in enumerate(experiments):  # a draw from the prior, moved by what it misses (Hoffman & Ribak 1991)
+    for j, one in enumerate(experiments):  # draw from the prior and correct it by the misfit (Hoffman & Ribak 1991)
         members[:, j] = drawn = mean @ one.design + (root @ generator.standard_normal((count, size, 1)))[:, :, 0]
         if not len(one.indices):  # an experiment that determines nothing adds nothing
             continue
@@ -248,17 +260,17 @@ def run_walkers(
     Parameters
     ----------
     log_density : callable
-        Points (m, p) to logarithms of the density (m,), up to a constant.
+        Function of points (m, p) that returns the logarithm of the density (m,), up to a constant.
     begin : ndarray (walkers, p)
         Starting points.
     steps : int
         Steps of every walker.
     seed : int
     what : str
-        Name of the task, for the error message where emcee is missing.
+        Name of the task, for the error message if emcee is missing.
     differences : bool
-        Whether walkers move along differences of others (ter Braak & Vrugt 2008), which in 10 to 15 dimensions took a
-        third of the steps of stretches.
+        True to move walkers along the difference of two others (ter Braak & Vrugt 2008) instead of by stretches; in 10
+        to 15 dimensions this needed a third of the steps.
 
     Returns
     -------
@@ -282,7 +294,7 @@ def run_walkers(
 
 
 def spread_of_chains(chains: Array) -> float:
-    """Split R-hat of chains (c, n) of one quantity: 1 where all halves of chains agree, more where they do not."""
+    """Split R-hat of chains (c, n) of one quantity: 1 if all halves of chains agree, larger if they do not."""
     half = chains.shape[1] // 2
     if half < 2:
         return np.inf

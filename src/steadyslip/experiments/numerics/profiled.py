@@ -1,7 +1,8 @@
-"""Bounded least squares of a few parameters, with intervals from the profile of the sum of squares.
+"""Bounded least squares for a few parameters, with confidence intervals from the profile of the sum of squares.
 
-Friction curves of a handful of speeds are far from linear in some parameters, and straight-line errors would cover
-too little there: an interval holds the values at which the best sum of squares is not larger than chance makes it.
+The model of a friction curve is far from linear in some parameters, so that intervals from standard errors would be too
+short. The profile of a parameter is the least sum of squares at each of its values; a confidence interval contains the
+values at which it exceeds the minimum by no more than chance explains.
 """
 
 from __future__ import annotations
@@ -14,30 +15,35 @@ import numpy as np
 from steadyslip.core.arrays import Array
 
 Residuals = Callable[[Array], tuple[Array, Array]]
-"""Function of the parameters (p,) that gives residuals (n,) and their Jacobian (n, p)."""
+"""Function of the parameters (p,) that returns residuals (n,) and their Jacobian (n, p)."""
 
-TOLERANCE = 1e-10  # relative, of a search's sum of squares and step: far below noise
-MOST_EVALUATIONS = 200  # of one search; dozens suffice
-FIRST_DAMPING, EASED, MOST_DAMPING = 1e-4, 10.0, 1e10  # of the descent, relative to the squared slopes
-MOST_STEPS, FURTHER = 40, 1.5  # outward steps of an end of an interval, each half as long again: over all bounds
-CLOSE = 0.01  # by how much of its limit the rise at an end may fall short after a search from all starts
-PRECISION = 1e-3  # of the ends of intervals, as a share of their width: three digits of an error are enough
-BETTER = 1e-6  # relative fall of the sum of squares that counts as another minimum
-EXACT = 1e-20  # mean square residual below which there is no noise to estimate, only rounding
+TOLERANCE = 1e-10  # relative tolerance of the sum of squares and of the step, far below noise
+MOST_EVALUATIONS = 200  # most evaluations of one search; dozens suffice
+FIRST_DAMPING, EASED, MOST_DAMPING = 1e-4, 10.0, 1e10
+"""Damping of Levenberg's method relative to the squared slopes: initial value, factor per step, largest value."""
+MOST_STEPS, FURTHER = 40, 1.5  # most steps outward to an end of an interval, and the ratio of successive steps
+CLOSE = 0.01  # relative amount by which the rise at an end may fall short after a search from all starts
+PRECISION = 1e-3  # tolerance for the ends of intervals, as a share of their width: three digits are enough
+BETTER = 1e-6  # relative decrease of the sum of squares that counts as another minimum
+EXACT = 1e-20  # a smaller mean square residual is rounding, not noise
 
 
 @dataclass(frozen=True)
 class ProfiledMinimum:
-    """Least squares within bounds.
+    """Minimum of a sum of squares within bounds.
 
     Attributes
     ----------
+    residuals : callable
+        See `Residuals`.
     at : ndarray (p,)
+        Parameters at the minimum.
     ssq : float
+        Sum of squares at the minimum.
     low, high : ndarray (p,)
-        Bounds.
+        Bounds of the parameters.
     starts : list of ndarray (p,)
-        From which other valleys are searched for.
+        Starting points for searches of other minima.
     """
 
     residuals: Residuals
@@ -49,16 +55,16 @@ class ProfiledMinimum:
 
     @property
     def freedom(self) -> int:
-        """Residuals less parameters."""
+        """Degrees of freedom: number of residuals minus number of parameters."""
         return len(self.residuals(self.at)[0]) - len(self.at)
 
     @property
     def variance(self) -> float:
-        """Mean square of the noise, estimated from the residuals."""
+        """Variance of the noise, estimated from the residuals."""
         return self.ssq / self.freedom
 
     def covariance(self) -> Array:
-        """Covariance of the parameters (p, p) near the minimum, as if residuals were linear; inf where singular."""
+        """Covariance (p, p) of the parameters for residuals linearised at the minimum; inf if it is singular."""
         jacobian = self.residuals(self.at)[1]
         size = np.linalg.norm(jacobian, axis=0)
         if not np.all(size > 0):
@@ -71,7 +77,7 @@ class ProfiledMinimum:
 
 
 def least(residuals: Residuals, starts: list[Array], low: Array, high: Array) -> ProfiledMinimum:
-    """Least sum of squares within bounds, the best of searches from several starts."""
+    """Minimum of the sum of squares within bounds: the best of searches from several starts."""
     from scipy.optimize import least_squares
 
     every = np.ones(len(low), dtype=bool)
@@ -80,14 +86,14 @@ def least(residuals: Residuals, starts: list[Array], low: Array, high: Array) ->
         lambda at: residuals(at)[0], np.clip(start, low, high), lambda at: residuals(at)[1], bounds=(low, high),
         x_scale="jac", ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    reach = TOLERANCE * (high - low)  # SciPy stays within bounds, by 1e-24 of a viscosity that is 0
+    reach = TOLERANCE * (high - low)  # SciPy stops short of bounds, such as at a viscosity of 1e-24 instead of 0
     at = np.where(found.x - low < reach, low, np.where(high - found.x < reach, high, found.x))
     own = residuals(at)[0]
     return ProfiledMinimum(residuals, at, float(own @ own), low, high, starts)
 
 
 def _descended(residuals: Residuals, start: Array, low: Array, high: Array, free: Array) -> tuple[Array, float]:
-    """Parameters and sum of squares after Levenberg's descent in the free ones, quick from a start that is near."""
+    """Parameters and sum of squares after Levenberg's method in the `free` parameters; it is quick from near starts."""
     at = np.where(free, np.clip(start, low, high), start)
     own, jacobian = residuals(at)
     ssq, damping = float(own @ own), FIRST_DAMPING
@@ -117,7 +123,7 @@ def _descended(residuals: Residuals, start: Array, low: Array, high: Array, free
 
 
 class _Improved(Exception):
-    """A search for an end of an interval found a smaller sum of squares than the minimum."""
+    """Raised if the search for an end of an interval finds a smaller sum of squares than that of the minimum."""
 
     def __init__(self, at: Array) -> None:
         super().__init__()
@@ -125,7 +131,7 @@ class _Improved(Exception):
 
 
 def intervals(minimum: ProfiledMinimum, levels: tuple[float, ...]) -> tuple[ProfiledMinimum, Array]:
-    """Intervals of every parameter from its profile and Student's t, the noise estimated.
+    """Confidence intervals of every parameter from its profile and Student's t, for noise estimated from residuals.
 
     Parameters
     ----------
@@ -136,9 +142,9 @@ def intervals(minimum: ProfiledMinimum, levels: tuple[float, ...]) -> tuple[Prof
     Returns
     -------
     minimum : ProfiledMinimum
-        That given, or a better one that was found on the way.
+        The given minimum, or a better one that was found on the way.
     ends : ndarray (p, levels, 2)
-        Infinite where a bound is reached before the sum of squares tells against the value.
+        Ends of the intervals; infinite where the interval reaches a bound of the parameter.
     """
     from scipy.special import stdtrit
 
@@ -154,7 +160,7 @@ def intervals(minimum: ProfiledMinimum, levels: tuple[float, ...]) -> tuple[Prof
 
 
 def _ends(minimum: ProfiledMinimum, i: int, limits: list[float]) -> Array:
-    """Ends of the intervals of one parameter (levels, 2) at rising limits of t."""
+    """Ends (levels, 2) of the intervals of parameter i at rising limits of t."""
     error = float(np.sqrt(minimum.covariance()[i, i]))
     own = float(minimum.at[i])
     if minimum.variance < EXACT and np.isfinite(error):
@@ -165,15 +171,15 @@ def _ends(minimum: ProfiledMinimum, i: int, limits: list[float]) -> Array:
     for side in (-1.0, 1.0):
         profile = _Profile(minimum, i)
         lengths = [abs(_end(profile, t, side * t * step) - own) for t in limits]
-        sides.append(own + side * np.maximum.accumulate(lengths))  # ends of one steep rise may differ by rounding
+        sides.append(own + side * np.maximum.accumulate(lengths))  # on a steep rise, rounding may disorder the ends
     return np.array(sides).T
 
 
 class _Profile:
-    """Rise of the least sum of squares over one parameter, as t: the root of its ratio to the variance.
+    """Profile of one parameter as t: the root of the rise of the least sum of squares over the variance.
 
-    A value is searched for from the nearest known ones of both sides, so that no search that went astray leads the
-    next ones; `check` also searches it from everywhere.
+    The search at a value starts from the nearest known values on both sides, so that one search that failed does not
+    mislead the next; `check` repeats it from all starts.
     """
 
     def __init__(self, minimum: ProfiledMinimum, i: int) -> None:
@@ -191,7 +197,7 @@ class _Profile:
         return self.known[value]
 
     def check(self, value: float) -> float:
-        """Rise at a known value from all starts; where it is another, values beyond it are forgotten."""
+        """Rise at a known value after searches from all starts; if it changes, values further out are discarded."""
         before, at = self.known[value], self._at[value]
         self._search(value, [at, self.minimum.at, *self.minimum.starts])
         if self.known[value] < before * (1 - PRECISION):
@@ -208,7 +214,10 @@ class _Profile:
 
 
 def _end(profile: _Profile, limit: float, step: float) -> float:
-    """Farthest value at which a profile rises to a limit; infinite where it does not within bounds."""
+    """Farthest value at which a profile rises to a limit; infinite if it stays below the limit within the bounds.
+
+    The first step of the search is `step` long; its sign is the side of the minimum.
+    """
     from scipy.optimize import brentq
 
     own, minimum = profile.own, profile.minimum

@@ -1,4 +1,4 @@
-"""Smoothing curves through noisy columns."""
+"""Smoothing splines through noisy columns."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from scipy.interpolate import BSpline, make_interp_spline, make_smoothing_spline
 
 from steadyslip.core.arrays import Array
 
-MOST_KNOTS = 4000  # knots of a smoothing spline; its cross-validation takes about a second for so many
-LOW_NOISE = 1e-3  # noise, as a share of a column's range, below which `MOST_KNOTS` are used instead of fewer
+MOST_KNOTS = 4000  # most knots of a smoothing spline: cross-validation then takes about a second
+LOW_NOISE = 1e-3  # columns with less noise, as a share of their range, always get `MOST_KNOTS`
 
 
 def smoothing_curve(time: Array, values: Array, noise: float, knots: int = MOST_KNOTS) -> Smooth:
-    """Cubic smoothing spline through samples, its smoothness by cross-validation.
+    """Cubic smoothing spline through samples; cross-validation sets its smoothness.
 
-    More samples than `knots` are averaged in groups first: correlated noise would mislead cross-validation, and group
-    means are nearly independent. Results are cached.
+    If there are more samples than `knots`, the spline is fitted to means of groups of samples: correlated noise would
+    mislead cross-validation, and group means are nearly independent. Results are cached.
     """
     columns = (np.asarray(column, dtype=float).tobytes() for column in (time, values))
     return _curve(*columns, noise, min(knots, MOST_KNOTS))
@@ -48,13 +48,13 @@ class Smooth:
         return np.asarray(self.spline((np.asarray(time) - self.origin) / self.unit)) * self.size
 
     def parts(self) -> list[Any]:
-        """Origin, unit, size, degree, knots and coefficients, from which `from_parts` makes the curve again."""
+        """List of origin, unit, size, degree, knots and coefficients, from which `from_parts` makes the curve again."""
         own = self.spline
         return [self.origin, self.unit, self.size, int(own.k), own.t.tolist(), own.c.tolist()]
 
     @classmethod
     def from_parts(cls, origin: float, unit: float, size: float, degree: int, knots: Any, coefficients: Any) -> Smooth:
-        """Make a curve from the list that `parts` returns.
+        """Spline from the items of the list that `parts` returns.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Split a measured column into ranges in which a straight line, or a constant, fits to within its noise."""
+"""Division of a measured column into ranges in which a straight line, or a constant, fits to within its noise."""
 
 from __future__ import annotations
 
@@ -6,22 +6,21 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 
-EVIDENCE = 60.0  # least decrease of the squared misfit by a split, in noise variances; chance gives far less
+EVIDENCE = 60.0  # least decrease of the squared misfit by a split, in noise variances; by chance it is far smaller
 MAD_TO_SIGMA = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 FEWEST = 4  # least number of samples in a range
 RESOLUTION = 1e-7  # least noise assumed, as a share of the range of a column
 MAX_RANGES = 500  # largest number of ranges
 MAX_SWEEPS = 4  # largest number of passes that adjust the ends of the ranges
-BRIEFLY = 33  # means of which a fast part is the lesser half, so that its samples are kept instead, and
-FAST = 10.0  # multiple of what the load point moves from mean to mean around it, and of the scatter of that
+BRIEFLY = 33  # window, in means, for the usual motion from mean to mean; shorter motions than half of it are brief
+FAST = 10.0  # a motion is fast from this multiple of the usual motion plus this multiple of its scatter
 BESIDE = 4  # means on each side of a fast part whose samples are kept too
-STAIRCASE_SHARE = (
-    0.2  # a column that starts or stops changing at a larger share of samples is a staircase of its resolution
-)
+STAIRCASE_SHARE = 0.2
+"""A column that starts or stops changing at a larger share of its samples is a staircase due to its resolution."""
 
 
 def spread(values: Array) -> float:
-    """Standard deviation estimated from the median absolute deviation, robust against outliers; 0 if empty."""
+    """Standard deviation from the median absolute deviation, robust against outliers; 0 for no values."""
     return float(MAD_TO_SIGMA * np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
 
 
@@ -35,7 +34,7 @@ def line(time: Array, values: Array) -> tuple[float, float]:
 
 
 def displacement_noise(time: Array, displacement: Array) -> float:
-    """Noise of a displacement column, m: robust deviation of samples from the line through their neighbours."""
+    """Noise of a displacement column, m, from the deviation of samples from the line through their neighbours."""
     share = (time[2:] - time[1:-1]) / (time[2:] - time[:-2])
     deviations = displacement[1:-1] - share * displacement[:-2] - (1 - share) * displacement[2:]
     white = spread(deviations / np.sqrt(1 + share**2 + (1 - share) ** 2))
@@ -43,13 +42,13 @@ def displacement_noise(time: Array, displacement: Array) -> float:
 
 
 def level_noise(values: Array) -> float:
-    """Noise of a column that is constant between steps, in its units: from the differences between its samples."""
+    """Noise of a column that is constant between steps, in its unit, from differences between successive samples."""
     white = spread(np.diff(values)) / np.sqrt(2.0)
     return float(max(white, RESOLUTION * float(np.max(np.abs(values))), 0.3 * _stair_height(values)))
 
 
 def _stair_height(values: Array) -> float:
-    """Height of the stairs of a column that its resolution turns into a staircase; 0 for other columns."""
+    """Height of the stairs of a column that is a staircase due to its resolution; 0 for other columns."""
     moved = np.abs(np.diff(values)) > 0
     if np.mean(moved[1:] != moved[:-1]) < STAIRCASE_SHARE:
         return 0.0
@@ -57,10 +56,10 @@ def _stair_height(values: Array) -> float:
 
 
 def ranges_of_means(displacement: Array, step: int, most: int) -> tuple[Array, bool]:
-    """First samples of ranges whose means are segmented, and whether there are brief parts whose samples are kept.
+    """First samples of ranges whose means are to be segmented, and True if some ranges are single samples.
 
-    A range is `step` samples long, and a single one where a load point moves briefly and so fast that a few means would
-    not show it, unless that makes more than `most` of these.
+    A range has `step` samples. Where the load point moves briefly and so fast that means would hide it, each sample is
+    a range, unless there would be more than `most` of them.
     """
     from scipy.ndimage import median_filter, uniform_filter1d
 
@@ -81,10 +80,10 @@ def typical(noise: Array) -> float:
 
 
 def split(time: Array, values: Array, noise: Array | float, linear: bool) -> list[tuple[int, int]]:
-    """Ranges of samples, first and one past the last, in which a line (or a constant) fits to within the noise.
+    """Ranges of samples (first, one past the last) in which a line, or a constant, fits to within the noise.
 
-    Ranges are split in two, where that reduces the misfit most, as long as it is reduced by more than noise explains,
-    whose standard deviation may be each sample's own (n,).
+    Ranges are split in two, where that reduces the misfit most, as long as it reduces the misfit by more than noise
+    explains. `noise` is its standard deviation, for all samples or for each (n,).
     """
     noise = np.broadcast_to(noise, len(time))
     waiting = [(0, len(time))]
@@ -102,7 +101,7 @@ def split(time: Array, values: Array, noise: Array | float, linear: bool) -> lis
 def _with_ends_adjusted(
     ends: list[tuple[int, int]], time: Array, values: Array, noise: Array, linear: bool
 ) -> list[tuple[int, int]]:
-    """Ranges with common ends moved to where they fit best; the first splits were made without knowing later ones."""
+    """Ranges with their common ends moved to the best place: early splits were made without knowing later ones."""
     for _ in range(MAX_SWEEPS):
         found = [ends[0]]
         for _, j in ends[1:]:
@@ -117,7 +116,7 @@ def _with_ends_adjusted(
 
 
 def _best_cut(time: Array, values: Array, linear: bool) -> tuple[int, float]:
-    """Index at which to split a range in two, 0 for none, and the decrease of the squared misfit."""
+    """Best index at which to split a range in two (0 for a range too short), and decrease of the squared misfit."""
     n = len(time)
     if n < 2 * FEWEST:
         return 0, 0.0

@@ -1,1 +1,1 @@
-"""Commanded loading of an experiment, found in measured columns; works on arrays, independent of laws."""
+"""Commanded loading of an experiment, found in measured columns; works on arrays, independent of friction laws."""

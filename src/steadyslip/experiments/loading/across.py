@@ -1,8 +1,9 @@
-"""Displacement that moves with friction: one measured across the fault, or behind a part of the press that yields.
+"""Detection of a displacement that moves with friction, as one measured across the fault or behind a yielding part.
 
-It is that of the load point less what a spring takes: few steps of the rate with friction beside them then follow it as
-well as a course of its own does. On a soft press such a course has changes and servos that are friction's doing, so
-that the times of steps are sought with friction beside them from the start.
+Such a displacement is that of the load point minus friction times the compliance of a spring. A model of a few steps of
+the rate plus a term in proportion to friction then fits as well as a course with many more changes. On a soft press, a
+course that is fitted without this term has changes and servos that friction causes; therefore the times of steps are
+searched with the term from the start.
 """
 
 from __future__ import annotations
@@ -21,23 +22,23 @@ from steadyslip.experiments.numerics.noise import lag_one
 from steadyslip.experiments.numerics.splitting import displacement_noise, level_noise
 
 WITH_FRICTION = -0.5
-"""Correlation of displacement and friction from which the one moves with the other. Of 50 records of the load point
-none was beyond -.05; of 18 measured across the fault 12 were, the others lost in noise or in changes found instead."""
-REPEATS = 3  # times that the course is found again
-MARGIN = 5.0  # samples' worth of squared noise that steps with friction may leave more than a course
-BESIDE = 2.0  # times its noise from sample to sample that a displacement strays from its course, if that follows it
-SLOW = 2.0  # times its noise from sample to sample that friction's is at most
-CERTAIN = 8.0  # standard errors by which a compliance must exceed 0; of 270 records of the load point two were beyond
-MOST_MEMORY = 0.9  # correlation of neighbouring samples that these errors count, at most
-ROUGHLY = 2.0  # factor by which means of samples may stray more than these
-KEPT = 0.5  # share of a compliance that a course found without it leaves of it
-MEANS = 200  # of samples, between which steps are sought
-MOST_STEPS = 6  # that are sought
-EXCHANGES = 4  # of all steps for better ones; one or two suffice
-STEPS_OF_TIMES = 6  # of Newton's method for the times of steps; two or three suffice near them
-FEWEST = 5  # samples between two changes that show how both move
-APART = 2  # samples beside one; chosen by trial
-SINGULAR = 1e-6  # share of a column that the others leave, below which it is one of them
+"""Displacement moves with friction if their correlation is below this. In 50 records of the load point it was above
+-.05; in 18 records measured across the fault it was below in 12 (others had much noise, or changes in its place)."""
+REPEATS = 3  # how often the course is found again without the stretch of the spring
+MARGIN = 5.0  # allowed excess of the squared deviations of steps with friction over those of a course, in samples
+BESIDE = 2.0  # a course follows a displacement if deviations are at most this multiple of the sample-to-sample noise
+SLOW = 2.0  # largest ratio of the whole noise of friction to its sample-to-sample noise
+CERTAIN = 8.0  # standard errors by which a compliance must exceed 0; in 270 records of the load point two did
+MOST_MEMORY = 0.9  # largest correlation of neighbouring samples that is taken into account in these errors
+ROUGHLY = 2.0  # limits for means of samples are weaker than those for samples by this factor
+KEPT = 0.5  # least share of the compliance that must remain when the course is found again
+MEANS = 200  # number of means of samples on which steps are searched
+MOST_STEPS = 6  # most steps in the search
+EXCHANGES = 4  # most rounds in which each step is replaced by a better one; one or two suffice
+STEPS_OF_TIMES = 6  # iterations of Newton's method for the times of steps; two or three suffice near them
+FEWEST = 5  # least number of samples between two changes that count in the correlation
+APART = 2  # distance, in samples, of the neighbours whose friction is averaged; chosen by trial
+SINGULAR = 1e-6  # a regressor with a smaller share independent of the others counts as dependent on them
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,9 @@ class Yielding:
     Attributes
     ----------
     lost : float
-        Displacement that it takes per friction, m.
+        Stretch of the spring per unit of friction coefficient, m.
     course : Course
-        Of the load point itself, without that displacement.
+        Course of the load point, from the displacement plus the stretch.
     """
 
     lost: float
@@ -57,10 +58,11 @@ class Yielding:
 
 
 def yielding(time: Array, displacement: Array, friction: Array, course: Course) -> Yielding | None:
-    """What a spring between sensor and load point takes; None if there is none.
+    """Spring between sensor and load point, and the course of the load point; None if there is no such spring.
 
-    Displacement moves with friction on the lines of its course, or with fewer changes and friction it is followed as
-    well as by a course of more, or late ones. The course is found again without that, until both agree.
+    There is a spring if the displacement moves with friction about the lines of its course, or if fewer steps with a
+    term of friction fit as well as the course. The course is found again from the displacement plus the stretch of the
+    spring, repeatedly.
     """
     if not course.strays > EXACTLY * float(np.ptp(displacement)):
         return None
@@ -68,27 +70,27 @@ def yielding(time: Array, displacement: Array, friction: Array, course: Course) 
     keep = np.ones(len(time), dtype=bool)
     if course.slips or course.glitches or _is_late(course):
         slips, keep = slips_and_glitches(time, displacement)
-    shown = _Shown(time[keep], displacement[keep], friction[keep], slips[:, keep])
-    found, lost = course, shown.with_friction(course)
+    data = _SensorData(time[keep], displacement[keep], friction[keep], slips[:, keep])
+    found, lost = course, data.stretch(course)
     least = KEPT * lost
     for _ in range(REPEATS if lost > 0 else 0):
         found = load_course(time, displacement + lost * friction)
         if not _is_late(found):
             break
-        lost, _ = shown.slope(found)
+        lost, _ = data.slope(found)
     doubtful = _is_late(found) and len(found.changes) > len(course.changes)
     return Yielding(lost, found) if lost > least and not doubtful else None
 
 
 def _is_late(course: Course) -> bool:
-    """True if the load point follows changes late, in a way of its own, or may."""
+    """True if the load point follows changes late, in pieces or along a smooth curve, or possibly does."""
     late = any(change.lag or change.pieces for change in course.changes)
     return late or course.otherwise is not None or course.curve is not None
 
 
 @dataclass(frozen=True)
-class _Shown:
-    """What a sensor shows beside friction, where it has no glitch.
+class _SensorData:
+    """Measured displacement and friction without glitches of the displacement sensor.
 
     Attributes
     ----------
@@ -96,7 +98,7 @@ class _Shown:
     slips : ndarray (k, n)
         1 after each sudden change of the sensor's level, 0 before it.
     apart : int
-        Samples to those whose friction stands for that of one, without the noise of its own.
+        Distance, in samples, of the two neighbours whose mean friction replaces that of a sample; 0 for none.
     """
 
     time: Array
@@ -105,56 +107,56 @@ class _Shown:
     slips: Array
     apart: int = APART
 
-    def with_friction(self, course: Course) -> float:
-        """Displacement lost per friction (m): by steps of the rate, or by what a course leaves; 0 where it is none."""
+    def stretch(self, course: Course) -> float:
+        """Stretch per friction (m), from steps of the rate or else from deviations from a course; 0 if none."""
         lost, together = self.slope(course)
-        return self.with_steps(course) or (lost if together <= WITH_FRICTION else 0.0)
+        return self.stretch_by_steps(course) or (lost if together <= WITH_FRICTION else 0.0)
 
-    def with_steps(self, course: Course) -> float:
-        """Displacement lost per friction (m) by which the fewest steps of the rate follow as well as a course; or 0."""
+    def stretch_by_steps(self, course: Course) -> float:
+        """Stretch per friction (m) with which the fewest steps of the rate fit as well as a course; 0 if none do."""
         off = self.displacement - (course.otherwise or course).integral(self.time)
         astray = np.std(off) > BESIDE * displacement_noise(self.time, self.displacement)
         smooth = course.otherwise is not None or course.curve is not None
         means, off_means = self._means(off)
         for times in means.steps(MOST_STEPS if astray or smooth else len(course.changes)):
-            if means.lost_beside(times, off_means, smooth, ROUGHLY) > 0:
-                found = self.lost_beside(times, off, smooth)
+            if means.stretch_near(times, off_means, smooth, ROUGHLY) > 0:
+                found = self.stretch_near(times, off, smooth)
                 if found > 0:
                     return found
         return 0.0
 
-    def lost_beside(self, times: Array, off: Array, smooth: bool, leeway: float = 1.0) -> float:
-        """Displacement lost per friction (m) if steps near some times and friction leave no more than a course does.
+    def stretch_near(self, times: Array, off: Array, smooth: bool, leeway: float = 1.0) -> float:
+        """Stretch per friction (m) if steps with a term of friction fit as well as a course; 0 if they do not.
 
         Parameters
         ----------
         times : ndarray (k,)
-            s.
+            Approximate times of the steps, s.
         off : ndarray (n,)
-            Displacement less a course, m.
+            Displacement minus the course, m.
         smooth : bool
-            True for a course with so many parameters that some of the noise is in it.
+            True for a course with so many parameters that it fits part of the noise.
         leeway : float, optional
-            Factor by which they may leave more.
+            Factor by which the deviations from the steps may be larger.
         """
         lost, error, strays = self.steps_and_friction(times)
         noise = displacement_noise(self.time, self.displacement)
-        own = min(float(np.std(_beside(off, self.slips))), BESIDE * noise)
+        own = min(float(np.std(_residuals_of(off, self.slips))), BESIDE * noise)
         own = max(own, noise) if smooth else own
         own *= 1 + MARGIN / len(off)
         most = leeway * float(np.hypot(own, SLOW * lost * level_noise(self.friction)))
         return lost if lost > CERTAIN / leeway * error and strays <= most else 0.0
 
-    def _means(self, off: Array) -> tuple[_Shown, Array]:
-        """The same of means of neighbouring samples, and means of `off` (n,): they move with friction alike."""
+    def _means(self, off: Array) -> tuple[_SensorData, Array]:
+        """Means of neighbouring samples of all columns, and of `off` (n,); they move with friction as samples do."""
         starts = np.arange(0, len(self.time), -(-len(self.time) // MEANS))
         counts = np.diff(starts, append=len(self.time))
         columns = np.vstack([self.time, self.displacement, self.friction, off, self.slips])
         time, displacement, friction, off, *slips = np.add.reduceat(columns, starts, axis=1) / counts
-        return _Shown(time, displacement, friction, np.array(slips).reshape(-1, len(time)), 0), off
+        return _SensorData(time, displacement, friction, np.array(slips).reshape(-1, len(time)), 0), off
 
     def steps(self, most: int) -> Iterator[Array]:
-        """Times (s) of the one step of the rate, then of two and more, that follow best with friction beside them."""
+        """Times (s) of the best single step of the rate, then of the best two steps and so on, with a friction term."""
         t = self.time - self.time[0]
         base, _ = np.linalg.qr(np.column_stack([np.ones_like(t), t / t[-1], self.friction, *self.slips]))
         at = t[2:-2]
@@ -164,34 +166,37 @@ class _Shown:
         able = np.diag(products) > SINGULAR * np.sum(since**2, axis=0)
         chosen: list[int] = []
         for _ in range(min(most, len(at) // FEWEST)):
-            chosen.append(_best_beside(chosen, products, shared, able))
+            chosen.append(_best_addition(chosen, products, shared, able))
             for _ in range(EXCHANGES if len(chosen) > 1 else 0):
                 before = sorted(chosen)
                 for one in before:
                     chosen.remove(one)
-                    chosen.append(_best_beside(chosen, products, shared, able))
+                    chosen.append(_best_addition(chosen, products, shared, able))
                 if sorted(chosen) == before:
                     break
             yield self.time[2:-2][sorted(chosen)]
 
     @cached_property
     def near(self) -> Array:
-        """Friction (n,) of samples near each, whose noise is not its own; of means, which have less, their own."""
+        """Mean friction (n,) of two neighbours of each sample, whose noise is independent of that of the sample.
+
+        If `apart` is 0, as for means with little noise, it is the friction of the sample.
+        """
         if not self.apart:
             return self.friction
         wide = np.pad(self.friction, self.apart, mode="edge")
         return np.asarray(0.5 * (wide[2 * self.apart :] + wide[: -2 * self.apart]))
 
     def steps_and_friction(self, times: Array) -> tuple[float, float, float]:
-        """Displacement lost per friction (m), its error, and scatter about steps of rate near some times, and it.
+        """Stretch per friction (m), its error (m) and the scatter (m) about steps near `times` with a term of friction.
 
-        Friction of samples nearby stands for that of each: its own noise would make what it explains too small.
+        Friction of neighbours serves as instrumental variable: noise of a regressor would make its coefficient small.
         """
         t, times = self.time - self.time[0], times - self.time[0]
         rates = np.array([])
         for last in [False] * STEPS_OF_TIMES + [True]:
             since = np.maximum(t - times[:, None], 0.0)
-            jumps = [] if last else list((since > 0) * 1.0)  # a jump stands for a change that was earlier or later
+            jumps = [] if last else list((since > 0) * 1.0)  # a jump here means that the change was earlier or later
             plain = [np.ones_like(t), t, *since, *self.slips, *jumps]
             rows, instead = (np.column_stack([-one, *plain]) for one in (self.friction, self.near))
             size = np.maximum(np.linalg.norm(instead, axis=0), 1e-300)
@@ -208,13 +213,13 @@ class _Shown:
         return float(found[0]), error * float(np.sqrt((1 + memory) / (1 - memory))), scatter
 
     def slope(self, course: Course) -> tuple[float, float]:
-        """Displacement lost per friction (m) and correlation of both, less straight lines between changes of rate."""
+        """Stretch per friction (m) and correlation of displacement and friction about lines between changes of rate."""
         if course.curve is not None:
             return 0.0, 0.0
         both = np.stack([self.displacement - course.integral(self.time), self.friction, self.near])
         edges = np.searchsorted(self.time, [-np.inf, *(change.time for change in course.changes), np.inf])
         parts = [
-            np.stack([_beside(one, np.stack([self.time[own] - self.time[own][0], *self.slips[:, own]]))
+            np.stack([_residuals_of(one, np.stack([self.time[own] - self.time[own][0], *self.slips[:, own]]))
                       for one in both[:, own]])
             for own in (slice(*pair) for pair in pairwise(edges))
             if own.stop - own.start >= FEWEST
@@ -227,14 +232,25 @@ class _Shown:
         return -float(np.sum(moved * near)) / worth, float(np.sum(moved * rose)) / size
 
 
-def _beside(values: Array, rows: Array) -> Array:
-    """What of values (n,) a constant and rows (k, n) leave."""
+def _residuals_of(values: Array, rows: Array) -> Array:
+    """Residuals (n,) of the regression of `values` on a constant and `rows` (k, n)."""
     columns = np.column_stack([np.ones_like(values), *rows])
     return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0])
 
 
-def _best_beside(chosen: list[int], products: Array, shared: Array, able: Array) -> int:
-    """Place of the column that explains most beside chosen ones, by products (p, p) of all and (p,) with the values."""
+def _best_addition(chosen: list[int], products: Array, shared: Array, able: Array) -> int:
+    """Index of the regressor that explains most of the values in addition to the `chosen` ones.
+
+    Parameters
+    ----------
+    chosen : list of int
+    products : ndarray (p, p)
+        Scalar products of all regressors.
+    shared : ndarray (p,)
+        Scalar products of the regressors with the values.
+    able : ndarray of bool (p,)
+        True for regressors that may be chosen.
+    """
     if chosen:
         ways = np.linalg.lstsq(products[np.ix_(chosen, chosen)], products[chosen], rcond=None)[0]
         left = np.diag(products) - np.sum(ways * products[chosen], axis=0)

@@ -1,8 +1,8 @@
 """Runs of a few samples before the first straight run of a displacement, and after the last.
 
-So few samples do not pay for a change of rate in the segmentation of the whole record (see `runs.py`). They are a run
-of their own if they show it by themselves: they lie on a straight forward line with a well-known rate that leads to the
-line of what follows. Other samples, such as the flank of a glitch, are left out and reported.
+The segmentation of the whole record (`runs.py`) does not find a change of rate that so few samples show. They are taken
+as a run if they lie on a straight line of well-determined forward rate that meets the line of the neighbouring run.
+Other samples, such as the flank of a glitch, are left out and reported.
 """
 
 from __future__ import annotations
@@ -14,19 +14,20 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.numerics.splitting import RESOLUTION
 
-OFF_LINE = 6.0  # standard deviations from a line beyond which a sample is not on it
-ON_LINE = 3.0  # standard deviations within which a sample counts as on it
-RATE_SIGMAS = 4.0  # standard errors by which rates must differ
-UNKNOWN_RATE = 0.1  # relative error of a rate beyond which it counts as unknown; chosen by trial
-REST_SHARE = 0.1  # share of the following rate below which so few samples are at rest, if the error allows it; by trial
+OFF_LINE = 6.0  # a sample is off a line beyond this number of standard deviations
+ON_LINE = 3.0  # a sample is on a line within this number of standard deviations
+RATE_SIGMAS = 4.0  # standard errors by which two rates must differ
+UNKNOWN_RATE = 0.1  # a rate with a larger relative error counts as unknown; chosen by trial
+REST_SHARE = 0.1  # few samples count as at rest below this share of the next rate, if 0 is within the error; by trial
 CHI_SIGMAS = 4.0  # standard deviations by which the chi squared of samples on a line may exceed its mean
 LONGEST_END = 0.05  # longest end, as share of the samples of a record; chosen by trial
 
 
 class Line(Protocol):
-    """Straight run of samples: rate (m/s), index of the first sample, and displacements (m) at the record's first time.
+    """Straight run of samples with its rate (m/s) and the index of its first sample.
 
-    There is one of these, and one more for each slip of the sensor within the run.
+    `levels` holds the displacement (m) of its line at the first time of the record, with one more value for each slip
+    of the sensor within the run.
     """
 
     rate: float
@@ -37,7 +38,7 @@ class Line(Protocol):
 
 
 def run_at_start(time: Array, displacement: Array, run: Line, noise: float) -> int:
-    """Number of samples that are a run of their own before the first run; zero if there is none.
+    """Number of samples that form a separate run before the first run; 0 if they form none.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ def run_at_start(time: Array, displacement: Array, run: Line, noise: float) -> i
     t = time - time[0]
     off = displacement - run.levels[0] - run.rate * t
     rate, first = run.rate, run.first
-    while first > 0 and abs(off[first - 1]) <= ON_LINE * noise:  # the cut may be a little after the start of the run
+    while first > 0 and abs(off[first - 1]) <= ON_LINE * noise:  # the run may begin a little before it was cut
         first -= 1
     if first < 2 or np.any(np.abs(off[:2]) <= OFF_LINE * noise):  # one sample has no rate
         return 0
@@ -77,7 +78,7 @@ def run_at_start(time: Array, displacement: Array, run: Line, noise: float) -> i
 
 
 def samples_off_line(time: Array, displacement: Array, run: Line, noise: float) -> int:
-    """Number of samples at the start of a record that are not on the line of its first run."""
+    """Number of samples at the start of a record that are off the line of its first run."""
     few = max(int(LONGEST_END * len(time)), 2)
     line = run.levels[0] + run.rate * (time[:few] - time[0])
     off = np.abs(displacement[:few] - line) > OFF_LINE * max(noise, RESOLUTION * float(np.ptp(displacement)))

@@ -1,6 +1,7 @@
-"""How a load point follows its command: at once, along ramps, late by a servo, or in a way of its own.
+"""Choice of the model for how a load point follows its command: at once, along ramps, as a servo, or in pieces.
 
-Tested on the displacement around each change. SensorSamples far from changes are averaged, as they tell lines alone.
+The models are compared on the displacement around each change. Samples far from changes are averaged, as they only
+determine the straight lines.
 """
 
 from __future__ import annotations
@@ -17,26 +18,26 @@ from steadyslip.experiments.loading.pieces import fit_pieces, is_beside
 from steadyslip.experiments.loading.servo import GAIN, settling
 from steadyslip.experiments.numerics.noise import describe
 
-LONGEST_LAG = 0.2  # of a servo, as a share of the time around a change in which nothing else changes; chosen by trial
-SPARED = 14.0  # decrease of chi squared by which a servo must fit better for each sensor level, or half a run, it saves
-COARSE = 0.5  # share of the gain of a servo that the best of those where its search starts has, at least
-AROUND = 3.0  # settling times of a servo that count as the neighbourhood of a change
-NEAR = 30.0  # samples on each side of a change that are kept one by one
-PER_EFOLD = 10.0  # means of the samples beyond, for each e-fold of their distance from the change; chosen by trial
-LEFT = 4.0  # standard errors by which the mean misfit around a change may be above that of normal noise, which is 0.83
-MOST_DESCRIBED = 4000  # samples from which correlation of the noise is found
+LONGEST_LAG = 0.2  # largest lag, as a share of the time around a change in which nothing else changes; by trial
+SPARED = 14.0  # decrease of chi squared credited to a servo for each sensor level, or half a run, that it replaces
+COARSE = 0.5  # least share of a servo's final gain that the best starting point of its search has
+AROUND = 3.0  # the neighbourhood of a change, in settling times of the servo
+NEAR = 30.0  # samples on each side of a change that are not averaged
+PER_EFOLD = 10.0  # number of means per e-fold of the distance from the change, further away; chosen by trial
+LEFT = 4.0  # standard errors by which the mean misfit around a change may exceed 1 (its mean for normal noise is 0.83)
+MOST_DESCRIBED = 4000  # samples from which the correlation of the noise is estimated
 
 
 @dataclass(frozen=True, eq=False)
 class Kinks:
-    """Changes of rate as lines between them show these.
+    """Changes of rate, estimated from straight lines between them.
 
     Attributes
     ----------
     meets : ndarray (changes,)
-        Times at which lines before and after a change meet, s from the first sample.
+        Times at which the lines before and after a change meet, s from the first sample.
     durations : ndarray (changes,)
-        Of straight ramps (s), 0 for steps.
+        Durations of straight ramps (s), 0 for steps.
     levels : ndarray
         Times at which the level of the sensor seems to change, s from the first sample.
     reach : float
@@ -52,17 +53,20 @@ class Kinks:
     glitches: Sequence[tuple[float, float]] = ()
 
     def in_glitch(self, time: Array) -> Array:
-        """True for times (n,) in a glitch of the sensor."""
+        """Mask (n,) of times that are in a glitch of the sensor."""
         first, last = np.array(self.glitches).reshape(-1, 2).T
         return np.asarray(np.any((time[:, None] > first) & (time[:, None] < last), axis=1))
 
     @property
     def longest(self) -> float:
-        """Longest lag of a servo that is looked for, s."""
+        """Longest lag (s) in the search for a servo."""
         return LONGEST_LAG * self.reach
 
     def far_levels(self, spacing: float) -> Array:
-        """Levels that are not within the longest lag after a change, where the response of a servo may seem one."""
+        """Times of changes of the sensor's level outside the longest lag after a change of rate.
+
+        Within that lag, the response of a servo may look like a change of the sensor's level.
+        """
         since = self.levels[:, None] - self.meets
         near = np.any((since >= -2 * spacing) & (since <= self.longest), axis=1)
         return np.asarray(self.levels[~near])
@@ -71,20 +75,20 @@ class Kinks:
 def followed(
     time: Array, values: Array, noise: float, ways: Sequence[Kinks], lasting: float = 1.0
 ) -> Iterator[JointFit]:
-    """How a load point follows changes of its rate: at once or along ramps, or late by a servo if that fits better.
-
-    Where its displacement is beside each of these, a fit in pieces that follow it comes second.
+    """Best fit of steps, ramps or a servo to a displacement; then, if that fails around changes, a fit in pieces.
 
     Parameters
     ----------
-    time, values : ndarray (n,)
-        s from the first sample, m.
+    time : ndarray (n,)
+        s from the first sample.
+    values : ndarray (n,)
+        Displacement, m.
     noise : float
-        Standard deviation, m.
+        Standard deviation of the displacement, m.
     ways : sequence of Kinks
-        All changes, then fewer and fewer: those that the response of a servo may have made are left out.
+        All changes, then fewer and fewer of them: changes that may be part of a servo's response are left out.
     lasting : float
-        Samples per independent sample, at least: a servo must gain in proportion.
+        Least number of samples per independent sample: the gain that a servo must reach grows with it.
     """
     spacing = float(np.median(np.diff(time)))
     lines = ways[0]
@@ -114,7 +118,7 @@ def followed(
     yield best
     if not is_beside(time, (values - best.predicted(time)) / noise, lines.meets):
         return
-    slight = sum(map(is_slight, at_once.rates, at_once.rates[1:]))  # changes that the way of others may have made
+    slight = sum(map(is_slight, at_once.rates, at_once.rates[1:]))  # these may be part of the response to others
     for kinks in reversed([one for one in ways if len(lines.meets) - len(one.meets) <= slight]):
         samples = _thinned(time, values, noise, kinks, kinks.far_levels(spacing), spacing)
         best = fit_pieces(samples, fit_at_once(samples, kinks.meets, np.zeros(len(kinks.meets))), spacing)
@@ -124,27 +128,27 @@ def followed(
 
 
 def _off(found: JointFit, at: Array, time: Array, values: Array, noise: float, spacing: float) -> list[Array]:
-    """Deviations from a servo of the samples around each of the times `at` (s), in standard deviations of the noise."""
+    """Deviations of samples from the fit of a servo, around each of the times `at` (s), in standard deviations."""
     length = AROUND * (settling(found.lag, found.damping) + spacing)
     around = [slice(*np.searchsorted(time, [one - length, one + length])) for one in at]
     return [(values[rows] - found.predicted(time[rows])) / noise for rows in around]
 
 
 def _is_noise(off: Array) -> bool:
-    """True for deviations whose mean misfit is that of noise."""
+    """True if the mean misfit of deviations (n,) is that of noise."""
     count = max(len(off), 1)
     return bool(OUTLIER**2 * np.sum(np.log1p((off / OUTLIER) ** 2)) / count <= 1 + LEFT / np.sqrt(count))
 
 
 def _inflation(found: JointFit, time: Array, values: Array) -> float:
-    """SensorSamples per independent sample of what a fit leaves."""
+    """Number of samples per independent sample in the residuals of a fit."""
     left = values[:MOST_DESCRIBED] - found.predicted(time[:MOST_DESCRIBED])
     size = OUTLIER * float(np.median(np.abs(left))) * 1.5 or 1.0
     return max(describe(np.clip(left, -size, size)).inflation, 1.0)
 
 
 def _thinned(time: Array, values: Array, noise: float, kinks: Kinks, levels: Array, spacing: float) -> SensorSamples:
-    """SensorSamples with means of those far from changes, over times that grow with the distance from the next."""
+    """Samples to be fitted; far from changes, they are means over times that grow with the distance from the change."""
     middles = 0.5 * (kinks.meets[1:] + kinks.meets[:-1])
     own = np.searchsorted(middles, time)
     away = time - kinks.meets[own]

@@ -1,8 +1,8 @@
 """Joint fit of all changes of rate of a displacement: lines, times, and the servo that follows the command.
 
-The displacement is c + v₀ t + Σ Δvᵢ S(t − tᵢ) + levels of the sensor, where S is the travel after a unit step of the
-rate: at once, along a straight ramp, or late (`steadyslip.experiments.loading.servo`). Lines that are fitted to the
-samples between changes alone take parts of a slow response for rates and levels; a joint fit does not.
+The displacement is c + v₀ t + Σ Δvᵢ S(t − tᵢ) + levels of the sensor. S is the travel after a unit step of the rate: at
+once, along a straight ramp, or late (`steadyslip.experiments.loading.servo`). If lines were fitted to the samples
+between changes only, parts of a slow response would be taken for rates and levels.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.loading import Pieces
 from steadyslip.experiments.loading.servo import DAMPINGS, late_response
 
-OUTLIER = 3.0  # standard deviations from which a sample weighs less
-ROUNDS = 3  # of weights for one linear fit, which is but a start
-EVALUATIONS = 40  # most of one nonlinear fit; 10 to 20 are usual
-LAGS = 12  # lags from which a search starts, in geometric progression
-MOST = 0.9  # share of the deviations from steps that the first, coarse fit of a servo takes for noise
-REFINED = 10.0  # factor by which the noise is made smaller from fit to fit
-OUTSIDE = 1e9  # deviation of all samples, in standard deviations, where a change leaves the record: no step goes there
+OUTLIER = 3.0  # samples weigh less from this number of standard deviations
+ROUNDS = 3  # rounds of weights in a linear fit, which only gives a starting point
+EVALUATIONS = 40  # most evaluations of one nonlinear fit; 10 to 20 are usual
+LAGS = 12  # number of lags from which a search starts, in geometric progression
+MOST = 0.9  # share of the deviations from steps that the first, coarse fit of a servo treats as noise
+REFINED = 10.0  # ratio of the noise assumed in successive fits
+OUTSIDE = 1e9  # deviation of all samples (standard deviations) if a change leaves the record, which rejects the step
 CHANGED = 1e-4  # relative step of lag and damping in numerical derivatives: errors of 1e-8, rounding of 1e-12
 
 
 _Responses = Callable[[Array, Array], tuple[Array, Array]]
-"""From times and nonlinear parameters to travel (s) and rate share after unit steps, each (n, changes)."""
+"""Function of times and nonlinear parameters that returns travel (s) and rate after unit steps, each (n, changes)."""
 _Found = tuple[Array, Array, Array, float, Array]
 """Nonlinear and linear parameters, deviations, misfit, covariance of the response's parameters."""
 
@@ -39,30 +39,30 @@ Shape = tuple[Array, list[Array]]
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """Joint fit of a displacement.
+    """Joint fit of lines and changes of rate to a displacement.
 
     Attributes
     ----------
     rates : ndarray (changes + 1,)
         m/s.
     times : ndarray (changes,)
-        Of the commands, s.
+        Times of the commands, s.
     lag, damping : float
-        Of the servo (s, 1); 0 without one.
+        Lag (s) and damping ratio of the servo; 0 without a servo.
     levels : sequence of float
         Times at which the level of the sensor changes, s.
     predicted : callable
         Displacement (m) at given times (s).
     deviations : ndarray (n,)
-        Measured less fitted displacement, in standard deviations of the noise.
+        Measured minus fitted displacement, in standard deviations of the noise.
     misfit : float
-        Sum of squared deviations, in which large ones count less.
+        Robust sum of squared deviations, see `misfit`.
     covariance : ndarray (2, 2)
-        Of the logarithms of lag and damping, for white noise unless `widened`; empty without a servo.
+        Covariance of the logarithms of lag and damping, for white noise unless `widened`; empty without a servo.
     pieces : tuple
         Straight ramps of each change, if they were fitted: begin after its time (s), duration (s), share of the change.
     shapes : sequence of Shape
-        Rates and shares one standard deviation from those of the pieces, in independent directions.
+        Rates and shares of the pieces one standard deviation from the fit, in independent directions.
     """
 
     rates: Array
@@ -78,7 +78,7 @@ class JointFit:
     shapes: Sequence[Shape] = ()
 
     def widened(self, inflation: float) -> JointFit:
-        """The same fit, in noise of so many samples per independent sample."""
+        """Fit with errors for correlated noise, which has `inflation` samples per independent sample."""
         wide = float(np.sqrt(inflation))
         own = [np.array([share for _, _, share in change]) for change in self.pieces]
         shapes = [
@@ -91,7 +91,10 @@ class JointFit:
         return replace(self, covariance=inflation * self.covariance, shapes=shapes)
 
     def others(self) -> tuple[tuple[float, float], ...]:
-        """Lag and damping one standard deviation away along each axis of their covariance, a factor of 2 at most."""
+        """Lag and damping one standard deviation from the fit along each axis of their covariance.
+
+        They differ from those of the fit by a factor of 2 at most.
+        """
         variances, axes = np.linalg.eigh(self.covariance)
         steps = (axes * np.sqrt(np.maximum(variances, 0.0))).T
         steps *= np.minimum(1.0, np.log(2) / np.maximum(np.max(np.abs(steps), axis=1, keepdims=True), 1e-300))
@@ -100,9 +103,20 @@ class JointFit:
 
 @dataclass(frozen=True, eq=False)
 class SensorSamples:
-    """Displacement to be fitted: times from the first (s), values (m), samples that each stands for; noise (m).
+    """Displacement to be fitted, some of it as means of samples.
 
-    `levels` (s) are times at which the level of the sensor changes.
+    Attributes
+    ----------
+    time : ndarray (n,)
+        Time since the first sample, s.
+    values : ndarray (n,)
+        Displacement, m.
+    worth : ndarray (n,)
+        Number of samples behind each value.
+    noise : float
+        Standard deviation of a sample, m.
+    levels : sequence of float
+        Times at which the level of the sensor changes, s.
     """
 
     time: Array
@@ -113,12 +127,12 @@ class SensorSamples:
 
     @property
     def scale(self) -> Array:
-        """Standard deviation of each value."""
+        """Standard deviation (n,) of each value, m."""
         return np.asarray(self.noise / np.sqrt(self.worth))
 
 
 def fit_at_once(samples: SensorSamples, times: Array, durations: Array) -> JointFit:
-    """Fit steps, or straight ramps of given durations (s), with free times."""
+    """Fit of steps, or straight ramps of given durations (s), with free times."""
     spread = np.maximum(durations, 1e-12 * (1 + np.abs(times)))
 
     def responses(t: Array, x: Array) -> tuple[Array, Array]:
@@ -128,17 +142,17 @@ def fit_at_once(samples: SensorSamples, times: Array, durations: Array) -> Joint
 
 
 def fit_servo(samples: SensorSamples, step: JointFit, shortest: float, longest: float, gain: float) -> JointFit | None:
-    """Fit steps that one servo follows late; None where that cannot be better than steps by `gain`.
+    """Fit of steps that are followed late by one servo; None if it cannot be better than sudden steps by `gain`.
 
     Parameters
     ----------
     samples : SensorSamples
     step : JointFit
-        Of steps at once to the same samples.
+        Fit of sudden steps to the same samples.
     shortest, longest : float
-        Range of lags from which the search starts, s; it may end at a fifth of the shortest.
+        Range of lags from which the search starts, s; the fitted lag may be down to a fifth of the shortest.
     gain : float
-        Decrease of the misfit below which no servo is looked for.
+        Least decrease of the misfit that a search is worth.
     """
     noisy = _coarser(samples, step.deviations)
     starts = [one for one in _starts(noisy, step, shortest, longest) if one[0] > gain]
@@ -169,7 +183,7 @@ def _joint_fit(
     samples: SensorSamples, found: _Found, responses: _Responses, count: int, lag: float, damping: float,
     earlier: Array | float,
 ) -> JointFit:  # fmt: skip
-    """Fit of `count` changes, whose commands are `earlier` (s) than the times that were fitted."""
+    """JointFit of `count` changes; their commands precede the fitted times by `earlier` (s)."""
     x, linear, deviations, size, covariance = found
 
     def predicted(time: Array) -> Array:
@@ -180,13 +194,16 @@ def _joint_fit(
 
 
 def _coarser(samples: SensorSamples, deviations: Array) -> SensorSamples:
-    """The same with so much noise that nearly all deviations from steps are within it: a misfit without far minima."""
+    """Samples with the noise set so large that nearly all deviations from steps are within it.
+
+    The misfit then has no local minima far from the best.
+    """
     size = float(np.quantile(np.abs(deviations), MOST)) / OUTLIER
     return replace(samples, noise=samples.noise * max(size, 1.0))
 
 
 def _refined(noisy: SensorSamples, samples: SensorSamples) -> Iterator[SensorSamples]:
-    """SensorSamples with less and less noise, by powers of ten, down to their own."""
+    """Samples with the noise of `noisy`, then ten times less and so on, down to their true noise."""
     noise = noisy.noise
     while noise > samples.noise * REFINED:
         yield replace(samples, noise=noise)
@@ -197,7 +214,7 @@ def _refined(noisy: SensorSamples, samples: SensorSamples) -> Iterator[SensorSam
 def _starts(
     samples: SensorSamples, step: JointFit, shortest: float, longest: float
 ) -> list[tuple[float, float, float]]:
-    """Gain over steps, lag and damping of servos, from the share of each that fits what steps leave best."""
+    """Gain over steps, lag and damping of possible servos, from a linear fit of each to the residuals of steps."""
     t, jumps = samples.time, np.diff(step.rates)
     moved, share = _at_once(t, step.times)
     base = np.linalg.qr(np.hstack([joint_columns(samples, moved), share]) / samples.scale[:, None])[0]
@@ -216,27 +233,27 @@ def _starts(
 
 
 def _at_once(t: Array, times: Array) -> tuple[Array, Array]:
-    """Travel (s) and rate share after unit steps at once, each (n, changes)."""
+    """Travel (s) and rate after sudden unit steps of the rate, each (n, changes)."""
     since = np.maximum(t[:, None] - times, 0.0)
     return since, (since > 0) * 1.0
 
 
 def ramp_responses(t: Array, begins: Array, durations: Array) -> tuple[Array, Array]:
-    """Travel (s) and rate share after unit ramps, each (n, ramps)."""
+    """Travel (s) and rate after straight ramps of the rate from 0 to 1, each (n, ramps)."""
     since = t[:, None] - begins
     share = np.clip(since / durations, 0.0, 1.0)
     return np.where(share < 1, 0.5 * share * since, since - 0.5 * durations), share
 
 
 def joint_columns(samples: SensorSamples, moved: Array) -> Array:
-    """Columns (n, p) of the linear fit: level, time, travel after each change, levels of the sensor."""
+    """Regressors (n, p) of the linear fit: constant, time, travel after each change, levels of the sensor."""
     t = samples.time
     levels = t[:, None] >= np.asarray(samples.levels, dtype=float)[None, :]
     return np.asarray(np.column_stack([np.ones(len(t)), t, moved, levels]))
 
 
 def _linear(samples: SensorSamples, moved: Array) -> tuple[Array, Array, float]:
-    """Robust linear fit: coefficients, deviations in standard deviations, misfit."""
+    """Coefficients (p,), deviations (n,) in standard deviations and misfit of a robust linear fit."""
     columns = joint_columns(samples, moved) / samples.scale[:, None]
     values, weight = samples.values / samples.scale, np.ones(len(samples.time))
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
@@ -250,15 +267,15 @@ def _linear(samples: SensorSamples, moved: Array) -> tuple[Array, Array, float]:
 
 
 def misfit(deviations: Array) -> float:
-    """Sum of squared deviations, in which large ones count less."""
+    """Robust sum of squares of deviations (n,) in standard deviations; large ones count less (Cauchy loss)."""
     return float(OUTLIER**2 * np.sum(np.log1p((deviations / OUTLIER) ** 2)))
 
 
 def _fitted(samples: SensorSamples, start: Array, responses: _Responses, extra: int = 0) -> _Found:
-    """Robust nonlinear fit of times and, the last `extra` of `start`, of the response."""
+    """Robust nonlinear fit of the times and of the response's parameters, which are the last `extra` of `start`."""
     count, inside = len(start) - extra, samples.time[[1, -2]]  # beyond, a change would have no effect
     start = np.append(np.clip(start[:count], *inside), start[count:])
-    known: list[tuple[Array, Array, Array, Array]] = []  # slopes are asked for where residuals were
+    known: list[tuple[Array, Array, Array, Array]] = []  # last response, kept for the derivatives at the same place
 
     def response(own: Array) -> tuple[Array, Array, Array]:
         if not known or not np.array_equal(own, known[0][0]):

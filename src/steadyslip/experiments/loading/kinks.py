@@ -21,29 +21,30 @@ from steadyslip.experiments.numerics.smoothing import smoothing_curve
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise
 
 RAMP_GAIN = 40.0  # decrease of chi squared by which a ramp must fit better than a step; chosen by trial
-OUTLIER = 9.0  # squared deviation (in units of the noise) from which a sample weighs less: three standard deviations
-BRIEF = 0.1  # share of a run's samples below which a sensor level may be the bottom of a glitch; chosen by trial
+OUTLIER = 9.0  # samples weigh less from this squared deviation (in units of the noise): three standard deviations
+BRIEF = 0.1  # a sensor level with a smaller share of a run's samples may be the bottom of a glitch; chosen by trial
 AT_REST, STILL = 1e-3, 7e-4
-"""Shares of the highest rate and of all travel up to which a run is a hold, in which sensors drift; chosen by trial: at
-1 um/s beside 1 mm/s the load point travels."""
-SLOW = 0.02  # share of the highest rate up to which a rate may be a hold, if the error allows it; chosen by trial
-MOST_CHANGES = 40  # more changes than this, or
-MOST_BETWEEN = 0.35  # a larger share of the time between runs, and the loading is not piecewise linear; chosen by trial
-ENOUGH_SAMPLES = 30  # samples that determine their own noise; chosen by trial
-BRIEF_RUN = 0.3  # share of a run beside it that a run lasts which may be a part of a servo's response; by trial
-MOST_BRIEF = 4  # such runs that are left out, the shortest first: more would be too many for one record
-LAG_ERROR = 0.1  # of a servo, relative, by which the time of its command is uncertain too
-SUDDEN = 5  # samples that a glitch of the sensor lasts at most, and on either side of a slip that show most of it
-LASTING = 2.0  # samples per independent sample from which correlation is taken into account where runs are found
-EXACTLY = 1e-9  # share of a column's range below which deviations are rounding
-EXACT = 1e-2  # error of a time in sampling intervals below which it is not fitted
+"""A run is a hold up to these shares of the highest rate and of the whole travel, as sensors drift in a hold; chosen by
+trial. A run at 1 um/s in a record with 1 mm/s is no hold."""
+SLOW = 0.02  # a run up to this share of the highest rate is a hold if 0 is within the error; chosen by trial
+MOST_CHANGES = 40  # most changes of a piecewise linear loading; chosen by trial
+MOST_BETWEEN = 0.35  # largest share of the time between runs in a piecewise linear loading; chosen by trial
+ENOUGH_SAMPLES = 30  # least number of samples that determine their noise; chosen by trial
+BRIEF_RUN = 0.3  # a run shorter than this share of a neighbour may be part of a servo's response; chosen by trial
+MOST_BRIEF = 4  # most such runs that are left out, the shortest first: a record hardly has more
+LAG_ERROR = 0.1  # error in the time of a command that a servo follows, as a share of the lag
+SUDDEN = 5  # most samples of a glitch of the sensor, and samples on each side of a slip that show its size
+LASTING = 2.0  # runs are found again for correlated noise from this number of samples per independent sample
+EXACTLY = 1e-9  # deviations below this share of a column's range are rounding
+EXACT = 1e-2  # a time is not fitted if its error is below this number of sampling intervals
 
 
 def load_course(time: Array, displacement: Array, blurred: bool = False) -> Course:
     """Course of the load-point rate from a displacement: straight runs or, if these do not fit, a smooth curve.
 
-    `blurred` is for a displacement that was integrated from a rate: it does not determine within a sampling interval
-    when the rate changed. Where the displacement around changes is beside the course, `otherwise` is one that follows.
+    `blurred` is true for a displacement that was integrated from a rate: it does not determine within a sampling
+    interval when the rate changed. If the displacement around changes is off the course, `otherwise` of the course is
+    a second one that follows it in pieces.
     """
     if not np.ptp(displacement) > 0:
         return Course(0.0)
@@ -71,7 +72,7 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
 
 
 class _Lines:
-    """Lines through a displacement: runs, their scatter (see `_errors`), and changes between them."""
+    """Straight runs of a displacement, their scatter (see `_errors`), and the changes between them."""
 
     def __init__(self, time: Array, displacement: Array, runs: list[Run]) -> None:
         self.time, self.displacement, self.runs = time, displacement, runs
@@ -84,9 +85,9 @@ class _Lines:
 
     @property
     def lasting(self) -> Array:
-        """Standard deviation (n,), m, of independent noise that hides as much as that around each sample does.
+        """Standard deviation (n,) of independent noise that hides as much as the noise around each sample, m.
 
-        The most of its run and the two beside it: where friction moves the sensor, the noise of one has none.
+        It is the largest of a sample's run and the two neighbours, as a single run may not show the correlation.
         """
         own = np.array(self.strays) * np.sqrt(self.inflation)
         around = np.max([np.pad(own, 1)[k : k + len(own)] for k in range(3)], axis=0)
@@ -94,7 +95,7 @@ class _Lines:
         return np.asarray(around[np.searchsorted(middles, self.time)])
 
     def course(self, joint: JointFit | None, blurred: bool) -> Course:
-        """Course of steps and ramps, or of changes that a joint fit found to be followed late."""
+        """Course of steps and ramps or, with a joint fit, of changes that are followed late or in pieces."""
         time, displacement, runs, kinks = self.time, self.displacement, self.runs, self.kinks
         rates = np.array([run.rate for run in runs]) if joint is None else joint.rates
         rest = _at_rest(rates, runs, self.errors, time, displacement)
@@ -120,18 +121,18 @@ class _Lines:
 
 
 def _at_rest(rates: Array, runs: list[Run], errors: list[float], time: Array, displacement: Array) -> Array:
-    """True for runs in which the load point is held, (runs,)."""
+    """Mask (runs,) of runs in which the load point is held."""
     top = float(np.max(np.abs(rates)))
     slow = np.array([SLOW if len(run.rows) >= ENOUGH_SAMPLES else REST_SHARE for run in runs]) * top
     travel = np.abs(rates) * [time[run.last - 1] - time[run.first] for run in runs]
     still = (np.abs(rates) <= AT_REST * top) & (travel <= STILL * np.ptp(displacement))
-    known = np.where(rates < 0, np.inf, 4 * np.array(errors))  # backward and so slowly: a sensor that drifts in a hold
+    known = np.where(rates < 0, np.inf, 4 * np.array(errors))  # slow and backward: drift of the sensor in a hold
     rest = still | (np.abs(rates) <= np.minimum(known, slow))
     return np.asarray(rest & (len(runs) > 1))
 
 
 def _without_brief(runs: list[Run], time: Array) -> Iterator[list[Run]]:
-    """All runs, then without the shortest between two others, and so on while that is brief beside one of these."""
+    """All runs, then fewer and fewer: the shortest is left out each time, while it is brief beside a neighbour."""
     for _ in range(MOST_BRIEF + 1):
         yield runs
         lasts = [float(time[one.last - 1] - time[one.first]) for one in runs]
@@ -143,7 +144,7 @@ def _without_brief(runs: list[Run], time: Array) -> Iterator[list[Run]]:
 
 
 def _as_lines(time: Array, runs: list[Run]) -> Kinks:
-    """Changes between runs as steps, with the times at which the level of the sensor seems to change."""
+    """Changes between runs, as steps where the lines meet, with changes of the sensor's level and glitches."""
     pairs = list(pairwise(runs))
     meets = [
         np.clip((one.levels[-1] - other.levels[0]) / (other.rate - one.rate),
@@ -169,9 +170,10 @@ def _as_lines(time: Array, runs: list[Run]) -> Kinks:
 
 
 def slips_and_glitches(time: Array, displacement: Array) -> tuple[Array, Array]:
-    """Sudden changes of a sensor's level within runs: rows (k, n) of 1 after each; and mask (n,) without glitches.
+    """Regressors (k, n) that are 1 after each sudden change of a sensor's level, and mask (n,) of samples to keep.
 
-    What takes many samples is not the sensor's: where friction has its peak, the machine yields.
+    Samples in a brief glitch are not kept. Changes of level that take many samples are not due to the sensor: the
+    machine yields at peaks of friction.
     """
     runs = straight_runs(time, displacement)
     slips, keep = [], np.ones(len(time), dtype=bool)
@@ -199,10 +201,10 @@ def smooth_load(time: Array, displacement: Array) -> Course:
 
 
 def _errors(runs: list[Run], time: Array, displacement: Array) -> tuple[list[float], list[float], list[float]]:
-    """Standard deviations of runs from their lines, errors of their rates, and samples per independent sample.
+    """Standard deviation from the line, error of the rate and samples per independent sample, for each run.
 
-    A run of few samples does not determine its noise; it gets that of the longest run. Neither does a run that seems
-    white determine the correlation of its noise where the longest run has one.
+    A run of few samples does not determine its noise; it gets that of the longest run. A run whose noise seems white
+    gets the correlation of the longest run, if that has correlated noise.
     """
     found = [_Scatter.of(run, time, displacement) for run in runs]
     longest = found[max(range(len(runs)), key=lambda k: len(runs[k].rows))]
@@ -219,7 +221,7 @@ def _errors(runs: list[Run], time: Array, displacement: Array) -> tuple[list[flo
 
 @dataclass(frozen=True, eq=False)
 class _Scatter:
-    """Scatter of a run about its line: standard deviation, noise, and each sample's share (n,) in the rate (1/s)."""
+    """Scatter of a run about its line: standard deviation, noise model, weights (n,) of samples in the rate (1/s)."""
 
     scale: float
     noise: Noise | None
@@ -233,7 +235,7 @@ class _Scatter:
 
     @property
     def inflation(self) -> float:
-        """Samples per independent sample."""
+        """Number of samples per independent sample."""
         return max(self.noise.inflation, 1.0) if self.noise else 1.0
 
     @classmethod
@@ -249,7 +251,7 @@ class _Scatter:
         share = u / max(size, 1e-300)
         if not (scale > 1e-9 * max(float(np.ptp(displacement)), 1e-300) and size > 0):
             return cls(scale, None, share)
-        levels = (own == np.arange(len(count))[:, None]).astype(float)  # they and the rate took slow noise out
+        levels = (own == np.arange(len(count))[:, None]).astype(float)  # fitted levels and rate removed slow noise
         return cls(scale, describe(np.clip(r, -4 * scale, 4 * scale), rows=np.vstack([levels, u])), share)
 
 
@@ -266,7 +268,7 @@ class _ChangeFit:
         self.spacing = float(np.median(np.diff(time[max(before.last - 3, 0) : after.first + 3])))
         self.adjacent = before.last == after.first
         self.rates = before.rate, after.rate
-        which = -1 if strays <= EXACTLY * float(np.ptp(displacement)) else 0  # without noise, ends of ramps seem levels
+        which = -1 if strays <= EXACTLY * float(np.ptp(displacement)) else 0  # exact ramp ends look like levels
         self.levels = _levels(before, -1)[which], _levels(after, 0)[which]
         difference = after.rate - before.rate
         self.meet = self.origin + (self.levels[0] - self.levels[1]) / difference
@@ -287,7 +289,7 @@ class _ChangeFit:
         self.time, self.displacement = time[rows], displacement[rows]
 
     def change(self, before: float, after: float, blurred: bool) -> Change:
-        """Change that fits the displacement best."""
+        """Step or ramp that fits the displacement best, between the levels `before` and `after` (m/s)."""
         slack = 6 * self.deviation + 2 * self.spacing
         own = 6 * self.deviation + 3 * self.strays / abs(self.rates[1] - self.rates[0])
         if not self.zone[0] - slack <= self.meet <= self.zone[1] + slack:
@@ -306,18 +308,18 @@ class _ChangeFit:
 
     @property
     def tells(self) -> bool:
-        """True if the samples around the change can tell how the load point follows it."""
+        """True if the samples around the change suffice to find how the load point follows it."""
         return len(self.time) >= ENOUGH_SAMPLES and self.reach > 0
 
     def late_change(
         self, at: float, before: float, after: float, lag: float, damping: float, pieces: Pieces = ()
     ) -> Change:
-        """Step at a time (s) that is followed late; the time is as uncertain as where the lines meet."""
+        """Step at a time (s) that is followed late; its time is as uncertain as the meeting point of the lines."""
         half = 6 * self.deviation + self.spacing + LAG_ERROR * lag
         return Change(at, 0.0, before, after, at - half, at + half, lag=lag, damping=damping, pieces=pieces)
 
     def _uncertain_change(self, before: float, after: float, slack: float) -> Change:
-        """Change where the lines do not meet between the runs, because of a glitch or a slip of the sensor."""
+        """Step of uncertain time: the lines do not meet between the runs, due to a glitch or a slip of the sensor."""
         first, last = self.zone
         length = last - first
         hidden = first - 2 * length - slack <= self.meet <= last + 2 * length + slack
@@ -329,7 +331,7 @@ class _ChangeFit:
 
     @cached_property
     def ramp(self) -> tuple[float, float, float]:
-        """Best duration (zero for a step), and the range of durations that fit nearly as well."""
+        """Best duration (0 for a step), and the shortest and longest duration that fit nearly as well, s."""
         if len(self.time) < 8 or not self.reach > 0:
             return 0.0, 0.0, 0.0
         grid = np.concatenate(
@@ -350,7 +352,7 @@ class _ChangeFit:
         return duration, 0.5 * min(float(ends[0]), duration), 1.5 * max(float(ends[1]), duration)  # for safety
 
     def _misfit(self, duration: float, outside: bool = True) -> float:
-        """Chi squared of a ramp between the two lines, or of the samples within it, robust against glitches."""
+        """Robust chi squared of a ramp between the two lines, over all samples or only those within the ramp."""
         begin = self.meet - 0.5 * duration
         first, last = np.searchsorted(self.time, begin, "right"), np.searchsorted(self.time, begin + duration)
         own = slice(first, max(first, last))
@@ -364,23 +366,23 @@ class _ChangeFit:
 
     @cached_property
     def _lines(self) -> list[Array]:
-        """Displacement (n,) on the lines before and after."""
+        """Displacements (n,) of the lines before and after the change."""
         t = self.time - self.origin
         return [level + rate * t for level, rate in zip(self.levels, self.rates, strict=True)]
 
     @cached_property
     def _costs_of_lines(self) -> list[Array]:
-        """For both lines beside the change: chi squared of the first 0 to n samples about the line, (n + 1,)."""
+        """Chi squared (n + 1,) of the first 0 to n samples about the lines before and after the change."""
         return [np.append(0.0, np.cumsum(self._costs(self.displacement - line))) for line in self._lines]
 
     def _costs(self, deviations: Array) -> Array:
-        """Chi squared of each deviation (n,), less than its square where that is large."""
+        """Robust square of each deviation (n,) in units of the scatter; large deviations count less."""
         scale = max(self.strays, 1e-9 * float(np.ptp(self.displacement)))
         return np.asarray(OUTLIER * np.log1p((deviations / scale) ** 2 / OUTLIER))
 
 
 def _levels(run: Run, edge: int) -> list[float]:
-    """Levels of the sensor at an end of a run (0 or -1): the last one, and the next if that lasted briefly."""
+    """Levels of the sensor at an end of a run (0 or -1): the outermost, and the next if the outermost lasts briefly."""
     counts = np.bincount(np.repeat(run.groups, [j - i for i, j in run.members]))
     found = [float(run.levels[edge])]
     if len(counts) > 1 and counts[edge] < BRIEF * np.sum(counts):
@@ -389,14 +391,14 @@ def _levels(run: Run, edge: int) -> list[float]:
 
 
 def _within_record(change: Change, time: Array) -> Change:
-    """Change moved so that it begins with at least two samples of the record on each side."""
+    """Change with its times moved so that at least two samples of the record are on each side."""
     low, high = float(time[1]), float(time[-2])
     begin, earliest, latest = (min(max(at, low), high) for at in (change.time, change.earliest, change.latest))
     return replace(change, time=begin, earliest=earliest, latest=latest)
 
 
 def _without_overlap(changes: list[Change]) -> list[Change]:
-    """Changes with windows cut so that neighbours cannot overlap."""
+    """Changes with the ranges of their times limited so that neighbours cannot overlap."""
     for i in range(len(changes) - 1):
         one, other = changes[i : i + 2]
         middle = 0.5 * (one.time + one.duration + other.time)

@@ -1,8 +1,8 @@
-"""Commanded loading of an experiment: rates of the load point, normal stress, and their changes.
+"""Commanded loading of an experiment: rates of the load point, normal stress, pore pressure, and their changes.
 
-Noise of a sensor must not drive a model: errors in variables bias the stiffness and the direct effect to low values. A
-model is driven by a `Course` fitted to the measured column: levels joined by steps or straight ramps, and a smooth
-curve where these do not fit.
+Noise of a sensor must not drive a model: it would bias the stiffness and the direct effect to low values (errors in
+variables). Instead, a model is driven by a `Course` fitted to the measured column: levels joined by steps or straight
+ramps, or a smooth curve if these do not fit.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from steadyslip.experiments.loading.servo import ramps
 
 LoadCurve = Callable[[Array], Array]
 Pieces = tuple[tuple[float, float, float], ...]
-SLIGHT = 1.5  # ratio of rates up to which a change may be waviness of a sensor: commanded ones are larger
-FELT = 1e-6  # error of a level, relative to the highest, below which it has no effect on a fit
+SLIGHT = 1.5  # changes of rate up to this ratio may be waviness of a sensor: commanded changes are larger
+FELT = 1e-6  # a smaller error of a level, relative to the highest level, has no effect on a fit
 
 
 def is_slight(before: float, after: float) -> bool:
-    """True for two rates so close that they may be one."""
+    """True if two positive rates (m/s) are so close that they may be the same."""
     return bool(before > 0 < after and max(before, after) < SLIGHT * min(before, after))
 
 
 @dataclass(frozen=True)
 class Change:
-    """One change of a level.
+    """Change of a level: a step, a straight ramp, a step followed late by a servo, or a series of ramps.
 
     Attributes
     ----------
@@ -40,17 +40,17 @@ class Change:
     duration : float
         Duration of a straight ramp, s; zero for a step.
     before, after : float
-        Levels.
+        Levels before and after the change: load-point rate (m/s) or pressure (Pa).
     earliest, latest : float
-        Range of the time at which it may begin, s; equal if the column determines it.
+        Range of possible times at which it begins, s; equal if the column determines the time.
     shortest, longest : float
         Range of the duration, s. For a step: zero, and the longest ramp that fits as well.
     lag, damping : float
-        Of a servo that follows a step late (see `steadyslip.experiments.loading.servo`), s and 1; `time` is then that
-        of the command. Zero where the level changes at once or along a ramp.
+        Lag (s) and damping ratio of a servo that follows a step late (see `steadyslip.experiments.loading.servo`);
+        `time` is then that of the command. Zero for a step or ramp.
     pieces : tuple of (float, float, float)
-        Straight ramps of a level that follows in a way of its own: begin after `time` (s), duration (s), share of the
-        change; empty otherwise.
+        Straight ramps of a change that is neither a step, a ramp nor the response of a servo: begin after `time` (s),
+        duration (s), share of the change; empty for other changes.
     """
 
     time: float
@@ -67,19 +67,19 @@ class Change:
 
     @property
     def ramps(self) -> tuple[tuple[float, float, float], ...]:
-        """Straight ramps of which it consists: begin after `time` (s), duration (s) and share of the change."""
+        """Straight ramps that make up the change: begin after `time` (s), duration (s) and share of the change."""
         if self.pieces:
             return self.pieces
         return ramps(self.lag, self.damping) if self.lag else ((0.0, self.duration, 1.0),)
 
     @property
     def free(self) -> bool:
-        """True if the column does not determine when it begins."""
+        """True if the column does not determine when the change begins."""
         return self.latest > self.earliest
 
     @property
     def slight(self) -> bool:
-        """True for a change of rate so small that it may be none but waviness of the sensor."""
+        """True for a change of rate so small that it may be waviness of the sensor."""
         return is_slight(self.before, self.after)
 
     @property
@@ -90,7 +90,7 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Course(ReadOnly):
-    """Commanded course of one channel: levels, changes between them, and a smooth curve added to them.
+    """Commanded load-point rate or pressure over time: levels, changes between them, and a smooth curve added to them.
 
     Attributes
     ----------
@@ -109,16 +109,16 @@ class Course(ReadOnly):
     glitches : int
         Number of other parts of the column that were left out.
     early, late : int
-        Number of samples at the beginning and at the end of the record that are not on the course; too few to tell if
-        the sensor or the loading differed.
+        Number of samples at the beginning and at the end of the record that are off the course; they are too few to
+        decide whether the sensor or the loading is the cause.
     servos : tuple of (float, float)
         Lag (s) and damping ratio of servos one standard deviation from that of the changes, in independent directions.
     shapes : tuple of (ndarray (changes + 1,), sequence of ndarray)
         Levels, and shares of each change in its pieces, one standard deviation from those of the course in independent
-        directions; where there are some, they stand for the errors of the levels too.
+        directions; if there are any, they include the errors of the levels.
     otherwise : Course or None
-        One with changes made of pieces that follow the column, if that is beside this course by more than its noise: a
-        load point that follows in a way of its own, or glitches of the sensor.
+        Second course whose changes consist of `pieces`, if the column around changes is off this course by more than
+        its noise: the load point may follow in its own way, or the sensor may have glitches.
     """
 
     first: float
@@ -139,7 +139,7 @@ class Course(ReadOnly):
         return np.asarray(read_only(np.array([self.first, *(change.after for change in self.changes)])))
 
     def at(self, time: Array) -> Array:
-        """Values at given times (s)."""
+        """Values (n,) at given times (s)."""
         knots, values = [-np.inf], [self.first]
         for change in self.changes:
             level = change.before
@@ -152,7 +152,7 @@ class Course(ReadOnly):
         return np.asarray(found if self.curve is None else found + self.curve(time))
 
     def within(self, start: float, end: float) -> Course:
-        """Part of the course between two times (s), in which no change is under way: levels, errors and changes."""
+        """Part of the course between two times (s); no change may be under way at these times."""
         met = [change.time + change.lag for change in self.changes]
         first, last = (int(np.searchsorted(met, moment)) for moment in (start, end))
         own = slice(first, last + 1)
@@ -164,12 +164,12 @@ class Course(ReadOnly):
         )  # fmt: skip
 
     def lowered(self, by: float) -> Course:
-        """The same course with all levels less `by`."""
+        """Course with `by` subtracted from all levels."""
         changes = tuple(replace(one, before=one.before - by, after=one.after - by) for one in self.changes)
         return replace(self, first=self.first - by, changes=changes)
 
     def integral(self, time: Array) -> Array:
-        """Integral from the first of given times."""
+        """Integral (n,) of the course from the first of given times (s) to each of them."""
         knots = [c.time + t for c in self.changes for since, length, _ in c.ramps for t in (since, since + length)]
         inner = [k for k in knots if time[0] < k < time[-1]]
         grid = np.unique(np.concatenate([time, inner]))
@@ -180,7 +180,7 @@ class Course(ReadOnly):
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """Commanded loading of an experiment.
+    """Commanded loading of an experiment: courses of load-point rate, normal stress and pore pressure.
 
     Attributes
     ----------
@@ -197,13 +197,16 @@ class Loading:
     pore: Course | None = None
 
     def within(self, start: float, end: float) -> Loading:
-        """Loading between two times (s), as found in the whole record."""
+        """Part of the loading between two times (s), as found in the whole record."""
         parts = (None if one is None else one.within(start, end) for one in (self.load, self.stress, self.pore))
         return Loading(*parts)
 
     @cached_property
     def changes(self) -> tuple[tuple[str, int, Change], ...]:
-        """(channel, index, change) in order of time; the channel is ``load``, ``stress`` or ``pore``."""
+        """Changes of all channels in order of time, as (channel, index in its course, change).
+
+        The channel is ``load``, ``stress`` or ``pore``.
+        """
         found = [
             (channel, i, change)
             for channel, course in (("load", self.load), ("stress", self.stress), ("pore", self.pore))
@@ -214,7 +217,7 @@ class Loading:
 
 
 def as_followed(loading: Loading, pieces: bool) -> Loading:
-    """Loading with the load point as it moves in pieces, where there is such a course, or as it was commanded."""
+    """Loading with one course of the load point: that in pieces if `pieces` is true and it exists, else the first."""
     load = loading.load
     if load is None or load.otherwise is None:
         return loading
@@ -222,9 +225,9 @@ def as_followed(loading: Loading, pieces: bool) -> Loading:
 
 
 def with_reference(loading: Loading) -> Loading:
-    """Loading in which one change at least has a known time: the first step, where its column shows it, if none has.
+    """Loading in which at least one change has a known time; if none has, that of the first step is fixed.
 
-    A lag of friction has no effect beside times that are all free: all would move together.
+    If all times were free, a lag of friction would have no effect, as all times could shift together.
     """
     if any(not change.free for _, _, change in loading.changes):
         return loading
@@ -240,7 +243,7 @@ def with_reference(loading: Loading) -> Loading:
 
 
 def resting_rate(loading: Loading) -> float | None:
-    """Rate (m/s) at which a load point moves after an initial rest; None if it moves from the start."""
+    """First rate (m/s) of a load point that rests initially; None if it moves from the start."""
     course = loading.load
     if course is None or course.curve is not None or course.first != 0.0:
         return None
@@ -248,20 +251,20 @@ def resting_rate(loading: Loading) -> float | None:
 
 
 def _with_shares(change: Change, shares: Array) -> Change:
-    """Change with other shares of its pieces."""
+    """Change with new shares (pieces,) of its pieces."""
     pieces = zip(change.pieces, shares.tolist(), strict=True)
     return replace(change, pieces=tuple((since, lasts, share) for (since, lasts, _), share in pieces))
 
 
 def _with_levels(course: Course, levels: Array, changes: Sequence[Change]) -> Course:
-    """Course with changes between other levels."""
+    """Course with new levels and changes between them."""
     ends = pairwise(levels.tolist())
     own = tuple(replace(one, before=low, after=high) for one, (low, high) in zip(changes, ends, strict=True))
     return replace(course, first=float(levels[0]), changes=own)
 
 
 def raised(course: Course) -> Iterator[Course]:
-    """Courses one standard deviation from it in levels and shapes: each level where its error is above rounding."""
+    """Courses that each differ from a course by one standard deviation in one shape or level."""
     levels = course.levels
     for others, shares in course.shapes:
         yield _with_levels(course, others, [_with_shares(*pair) for pair in zip(course.changes, shares, strict=True)])
@@ -273,7 +276,10 @@ def raised(course: Course) -> Iterator[Course]:
 
 
 def shifted(loading: Loading, pressed: bool) -> Iterator[Loading]:
-    """Loadings with one level of stress each raised by its standard deviation, and with other servos."""
+    """Loadings that each differ by one standard deviation in one level of pressure, or in the response of a servo.
+
+    `pressed` includes the courses of normal stress and pore pressure.
+    """
     for channel in ("load", "stress", "pore") if pressed else ("load",):
         course = getattr(loading, channel)
         if course is None:

@@ -1,8 +1,8 @@
-"""Changes of rate as straight pieces, for a load point that follows its command neither at once nor as a servo does.
+"""Changes of rate as piecewise linear functions, for a load point that follows neither at once nor as a servo does.
 
-A displacement whose samples around changes lie beside the best steps, ramps or servo by more than its noise is fitted
-by a rate that is constant between changes and free around them: straight between nodes that are dense at a change, no
-rougher than cross-validation asks for.
+This model is used if samples around changes are off the best steps, ramps or servo by more than their noise. The rate
+is constant between changes and free around them: linear between nodes that are dense at each change, and as smooth as
+cross-validation requires.
 """
 
 from __future__ import annotations
@@ -26,26 +26,29 @@ from steadyslip.experiments.loading.joint import (
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA
 
 BESIDE = 5.0
-"""Standard deviations by which a mean of samples near a change is off. Of 240 records of steps and servos with white
-and correlated noise none was beyond 4.7; loads that creep, stick or have two time constants are from 11 on."""
-ELSEWHERE = 1.3  # factor by which it must be off by more than means of as many samples far from changes
-SHORTEST, WINDOWS = 4, 20  # samples of the shortest mean, and means of samples far from changes that show their scatter
-DENSE, GROWTH = 4, 1.25  # nodes one sampling interval apart on each side of a change, then wider by this factor
-SHARE = 0.45  # of the time to the next change that may belong to a change: lines need the rest
-BEGUN = 0.05  # share of a change that is made when it counts as begun
-COMPARED, EVEN = 25, 1e-9  # weights of roughness that are compared, and its smallest share: the largest is 1
-SINGULAR = 1e-12  # share of each column added where samples are lost and pieces have none
+"""Standard deviations by which a mean of samples near a change must be off. In 240 records of steps and servos with
+white and correlated noise none was off by more than 4.7; loads that creep, stick or have two time constants are off by
+11 and more."""
+ELSEWHERE = 1.3  # ratio by which such a mean must exceed all means of as many samples far from changes
+SHORTEST, WINDOWS = 4, 20  # samples of the shortest mean; number of means far from changes needed to know their scatter
+DENSE, GROWTH = 4, 1.25  # nodes one sampling interval apart on each side of a change; ratio of further distances
+SHARE = 0.45  # share of the time to the next change that may belong to a change: lines need the rest
+BEGUN = 0.05  # a change has begun when this share of it is done
+COMPARED, EVEN = 25, 1e-9  # number of smoothing strengths compared, and ratio of the weakest to the strongest
+SINGULAR = 1e-12  # added to the unit diagonal, so that pieces without samples (lost ones) do not make it singular
 
 
 def is_beside(time: Array, off: Array, changes: Array) -> bool:
-    """True if means of samples near changes are off by more than their noise and than those of samples far away.
+    """True if a fit fails around changes: means of deviations there exceed their noise and the means far from changes.
 
     Parameters
     ----------
-    time, off : ndarray (n,)
-        s; deviations in standard deviations of a sample.
-    changes : ndarray (changes,)
+    time : ndarray (n,)
         s.
+    off : ndarray (n,)
+        Deviations from the fit, in standard deviations of a sample.
+    changes : ndarray (changes,)
+        Times of the changes, s.
     """
     places, count = np.searchsorted(time, changes), len(time)
     total = np.concatenate([[0.0], np.cumsum(np.clip(off, -OUTLIER, OUTLIER))])
@@ -66,13 +69,13 @@ def is_beside(time: Array, off: Array, changes: Array) -> bool:
 
 
 def fit_pieces(samples: SensorSamples, step: JointFit, spacing: float) -> JointFit:
-    """Fit a rate that is free around changes and constant between them.
+    """Fit of a rate that is free around changes and constant between them.
 
     Parameters
     ----------
     samples : SensorSamples
     step : JointFit
-        Of steps at once to the same samples.
+        Fit of sudden steps to the same samples.
     spacing : float
         Sampling interval, s.
     """
@@ -87,9 +90,7 @@ def fit_pieces(samples: SensorSamples, step: JointFit, spacing: float) -> JointF
 
     rows, values = columns(samples.time) / samples.scale[:, None], samples.values / samples.scale
     rough = np.zeros((len(own) + len(nodes), rows.shape[1]))
-    for k, i in enumerate(
-        own.tolist()
-    ):  # differences of neighbouring pieces of a change, and of the outer ones from none
+    for k, i in enumerate(own.tolist()):  # differences of neighbouring pieces, with 0 beyond the outer ones
         rough[k + i : k + i + 2, 2 + k] = np.array([1.0, -1.0]) / jumps[i]
     found, deviations = _smoothest(rows, values, rough)
 
@@ -112,7 +113,7 @@ def fit_pieces(samples: SensorSamples, step: JointFit, spacing: float) -> JointF
 
 
 def _nodes(time: Array, changes: Array, spacing: float) -> list[Array]:
-    """Ends of the pieces of each change, s."""
+    """Ends of the pieces (s) for each change."""
     edges = np.concatenate([time[:1], changes, time[-1:]])
     steps = spacing * np.concatenate([np.ones(DENSE), GROWTH ** np.arange(1, 100)])
     found = []
@@ -123,17 +124,17 @@ def _nodes(time: Array, changes: Array, spacing: float) -> list[Array]:
 
 
 def _smoothest(rows: Array, values: Array, rough: Array) -> tuple[Array, Array]:
-    """Coefficients (p,) of a robust fit, no rougher than generalised cross-validation asks for, and deviations (p, p).
+    """Coefficients (p,) of a robust fit with roughness penalty by generalised cross-validation, and deviations (p, p).
 
-    The latter are one standard deviation along the axes of the coefficients' distribution, if roughness beforehand is
-    as likely as its penalty says (Wahba 1983): that of noise alone would leave out what smoothing takes away.
+    Each deviation is one standard deviation along an axis of the coefficients' posterior, with the penalty as prior
+    (Wahba 1983); the effect of noise alone would not include the error that smoothing causes.
     """
     weight, found, axes = np.ones(len(values)), np.zeros(rows.shape[1]), np.empty((0, rows.shape[1]))
     for _ in range(ROUNDS):
         heavy = rows * weight[:, None]
         size = np.maximum(np.linalg.norm(heavy, axis=0), 1e-300)
         normal = (heavy / size).T @ (heavy / size) + SINGULAR * np.eye(len(size))
-        strength, ways = eigh((rough / size).T @ (rough / size), normal)  # both are diagonal along these ways
+        strength, ways = eigh((rough / size).T @ (rough / size), normal)  # these vectors make both matrices diagonal
         strength = np.maximum(strength, 0.0)
         right = ways.T @ ((heavy / size).T @ (values * weight))
         least = np.inf

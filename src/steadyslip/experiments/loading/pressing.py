@@ -1,4 +1,4 @@
-"""Course of the normal stress (constant or smooth, with steps and short ramps), and all changes as list of steps."""
+"""Course of the normal stress (constant or smooth, with steps and ramps), and list of all changes of a loading."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from steadyslip.experiments.numerics.smoothing import Smooth, smoothing_curve
 from steadyslip.experiments.numerics.splitting import FEWEST, level_noise, split
 
 LEAST_STRESS = 2e-3  # relative change of normal stress that counts as a change; chosen by trial
-OFF_LEVEL = 6.0  # standard deviations from a level beyond which a sample is not on it
-SUDDEN = 0.7  # share of a change that must happen between the few samples on both sides; chosen by trial,
-NEAR = 3  # samples on each side
-CLIMB = 0.2  # share of a rise: the halves of a ramp are .4 to .5 apart, those of a level between two steps 0
+OFF_LEVEL = 6.0  # a sample is off a level beyond this number of standard deviations
+SUDDEN, NEAR = 0.7, 3
+"""Least share of a change between means of samples before and after it, and number of samples in each; by trial."""
+CLIMB = 0.2  # a ramp's halves differ by more than this share of the rise: by .4 to .5; halves of a level by 0
 BINS = 40  # number of means of a span that are tested for being constant; chosen by trial
-UNEVEN = 3.0  # ratio of their variance to that of noise from which the span is not constant; chosen by trial
-EARLIEST_STEP = 1e-6  # share of a sampling interval: earliest time of a step after the sample before it
+UNEVEN = 3.0  # a span is not constant if the variance of its means is this multiple of that of noise; chosen by trial
+EARLIEST_STEP = 1e-6  # least time from a sample to a step after it, as a share of the sampling interval
 SLOW = 400  # knots of a curve between two changes: faster variation counts as noise; chosen by trial
 PER_PERIOD = 60  # knots per period of an oscillation; chosen by trial
-OSCILLATION = 8  # sign changes from which a stress oscillates; chosen by trial
+OSCILLATION = 8  # a stress oscillates from this number of sign changes; chosen by trial
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class StressWave:
 
 
 def stress_course(time: Array, normal: Array) -> Course:
-    """Commanded normal stress; a single deviating sample at an end of the record is left out."""
+    """Course of the commanded normal stress; a single deviating sample at an end of the record is left out."""
     early, late = (_deviates_alone(column) for column in (normal, normal[::-1]))
     if early or late:
         inner = slice(early, len(time) - late)
@@ -49,7 +49,7 @@ def stress_course(time: Array, normal: Array) -> Course:
     if len(time) < 2 * FEWEST:
         return Course(float(np.mean(normal)), strays=noise)
     places = _transitions(time, normal, split(time, normal, noise, linear=False))
-    for _ in range(2):  # the second pass adds the ends of slow ramps, which noise hid before their line was known
+    for _ in range(2):  # the second pass adds the ends of slow ramps, which noise hides until the ramp is known
         ends = [0, *(place for pair in places for place in pair), len(time)]
         spans = [slice(i, j) for i, j in zip(ends[::2], ends[1::2], strict=True)]
         levels = [float(np.mean(normal[span])) for span in spans]
@@ -63,12 +63,12 @@ def stress_course(time: Array, normal: Array) -> Course:
         if _is_not_constant(normal[span], noise):
             curves.append(_curve_on_span(time[span], normal[span], level, noise, SLOW))
     errors = np.array([noise / np.sqrt(span.stop - span.start) for span in spans])
-    errors[noise <= 2e-7 * abs(levels[0])] = 0.0  # noise as small as the resolution assumed: levels are exact
+    errors[noise <= 2e-7 * abs(levels[0])] = 0.0  # no noise but rounding: levels are exact
     return Course(levels[0], changes, errors, JoinedCurves(curves) if curves else None, noise)
 
 
 def _deviates_alone(normal: Array) -> int:
-    """1 if the first sample is far from those that follow, which agree; else 0."""
+    """1 if the first sample is far from the next ones, which agree with each other; else 0."""
     if len(normal) < 4 * FEWEST:
         return 0
     following = normal[1 : 1 + FEWEST]
@@ -77,7 +77,7 @@ def _deviates_alone(normal: Array) -> int:
 
 
 def _transitions(time: Array, normal: Array, ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """For every change: one past the last sample before it, and the first sample after it."""
+    """Samples at every change, as pairs: one past the last sample before it, and the first sample after it."""
     levels = np.array([float(np.median(normal[i:j])) for i, j in ranges])
     for k, edge in ((0, slice(0, 2)), (-1, slice(-2, None))):  # the shortest range at an end may contain a change
         if ranges[k][1] - ranges[k][0] < 2 * FEWEST:
@@ -107,14 +107,14 @@ def _transitions(time: Array, normal: Array, ranges: list[tuple[int, int]]) -> l
 
 
 def _is_passing(levels: Array, lengths: Array, first: int, middle: int) -> bool:
-    """True for a short range between its neighbours in value: part of a change."""
+    """True if a range is part of a change: short, with a level between those of its neighbours."""
     low, high = sorted((levels[first], levels[middle + 1]))
     between = low < levels[middle] < high
     return bool(between and lengths[middle] < 0.2 * max(lengths[first], lengths[middle + 1]))
 
 
 def _climbs(values: Array, rise: float) -> bool:
-    """True if the means of the two halves of values are more than `CLIMB` of a rise apart."""
+    """True if the means of the two halves of values (n,) differ by more than `CLIMB` times `rise`."""
     half = len(values) // 2
     return bool((np.mean(values[-half:]) - np.mean(values[:half])) / rise > CLIMB)
 
@@ -122,7 +122,7 @@ def _climbs(values: Array, rise: float) -> bool:
 def _between(
     normal: Array, one: tuple[int, int], other: tuple[int, int], before: float, after: float, noise: float
 ) -> tuple[int, int]:
-    """Range of samples that belong to neither level."""
+    """Range of samples between two ranges that are on neither of their levels."""
     i, j = max(one[1] - FEWEST, one[0] + 1), min(other[0] + FEWEST, other[1] - 1)
     part = normal[i:j]
     away, there = np.abs(part - before) > OFF_LEVEL * noise, np.abs(part - after) <= OFF_LEVEL * noise
@@ -133,14 +133,14 @@ def _between(
 
 
 def _sudden(normal: Array, pair: tuple[int, int], apart: float) -> bool:
-    """True if the change happens within the few samples between two levels, not slowly all along."""
+    """True if most of the change happens between the samples `pair`, rather than slowly on both sides."""
     last, first = pair
     before, after = normal[max(last - NEAR, 0) : last], normal[first : first + NEAR]
     return bool(len(before) and len(after) and abs(np.mean(after) - np.mean(before)) > SUDDEN * apart)
 
 
 def _straight(time: Array, normal: Array, pair: tuple[int, int], noise: float) -> bool:
-    """True if the samples between two levels are a straight ramp within noise; also if they are too few to tell."""
+    """True if the samples between two levels are a straight ramp within noise, or too few to decide."""
     inner = slice(*pair)
     t, s = time[inner], normal[inner]
     if len(t) < FEWEST:
@@ -150,7 +150,7 @@ def _straight(time: Array, normal: Array, pair: tuple[int, int], noise: float) -
 
 
 def _whole_ramp(time: Array, pair: tuple[int, int], change: Change) -> tuple[int, int]:
-    """Range of all samples of a ramp, extended for long ramps."""
+    """Range of all samples of a change; for a long ramp, extended to where its line meets the levels."""
     last, first = pair
     if first - last < FEWEST:
         return pair
@@ -159,7 +159,7 @@ def _whole_ramp(time: Array, pair: tuple[int, int], change: Change) -> tuple[int
 
 
 def _change(time: Array, normal: Array, last: int, first: int, levels: list[float], noise: float) -> Change:
-    """Change from one sample to a later one: a step, or the ramp through the samples between."""
+    """Change between two samples: a step if they are neighbours, or the ramp through the samples between them."""
     before, after = levels
     early, late = float(time[last]), float(time[first])
     if first == last + 1:  # begins after the earlier sample, because friction jumps with the stress
@@ -182,7 +182,7 @@ def _change(time: Array, normal: Array, last: int, first: int, levels: list[floa
 
 
 def _is_not_constant(values: Array, noise: float) -> bool:
-    """True if a stress between two changes is not constant."""
+    """True if the values (n,) of a stress between two changes vary by more than noise."""
     if len(values) < 2 * FEWEST:
         return False
     size = max(len(values) // BINS, 1)
@@ -196,7 +196,7 @@ def _curve_on_span(time: Array, normal: Array, level: float, noise: float, knots
 
 
 class JoinedCurves:
-    """Function that joins curves, each on its own span: linear between spans, constant outside."""
+    """Function of time that joins curves on separate spans: linear between spans, constant outside them."""
 
     def __init__(self, spans: list[tuple[float, float, Smooth]]) -> None:
         self.spans = spans
@@ -235,18 +235,19 @@ def oscillation(time: Array, normal: Array) -> StressWave | None:
 
 @dataclass(frozen=True)
 class LoadStep:
-    """One change of the load-point rate or normal stress of an experiment.
+    """Change of the load-point rate, normal stress or pore pressure of an experiment.
 
     Attributes
     ----------
     kind : str
-        ``velocity step``, ``hold``, ``reslide``, ``normal-stress step`` or ``normal-stress oscillation``.
+        ``velocity step``, ``hold``, ``reslide``, ``normal-stress step``, ``normal-stress oscillation`` or
+        ``pore-pressure step``.
     time : float
         Time at which it begins, s.
     duration : float
         Duration, s; zero for a sudden change. For an oscillation: its period.
     before, after : float
-        Load-point rate (m/s) or normal stress (Pa); for an oscillation its mean and amplitude.
+        Load-point rate (m/s) or pressure (Pa) before and after; for an oscillation, its mean and amplitude.
     """
 
     kind: str

@@ -1,8 +1,8 @@
-"""Straight runs of a measured displacement, found through noise, glitches and slips of the sensor.
+"""Straight runs of a measured displacement, found in spite of noise, glitches and slips of the sensor.
 
-The displacement is cut wherever a line no longer fits, which cuts at glitches too. Pieces are then joined to runs of
-one rate: across excursions that return to the line (glitches), and across sudden changes of level (slips of the
-sensor). Samples between two runs are the transition from one rate to the next.
+The displacement is cut wherever a line no longer fits, also at glitches. Pieces are then joined to runs of one rate:
+across excursions that return to the line (glitches), and across sudden changes of level (slips of the sensor). Samples
+between two runs are the transition from one rate to the next.
 """
 
 from __future__ import annotations
@@ -16,37 +16,38 @@ from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import reversed_column, run_at_start
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise, ranges_of_means, split, typical
 
-RATE_SIGMAS = 4.0  # standard errors by which rates must differ, and
-LIKE = 0.02  # relative difference below which they do not differ; chosen by trial
+RATE_SIGMAS = 4.0  # standard errors by which two rates must differ
+LIKE = 0.02  # relative difference of rates that counts as none; chosen by trial
 LEAST_CHANGE = 0.05  # relative change of rate that counts as a change; chosen by trial
-BACK = 5.0  # standard errors within which a displacement has returned to a line
-LONGEST_GLITCH = 0.2  # share of the time of a record, and of its travel; chosen by trial
+BACK = 5.0  # a displacement is back on a line within this number of standard errors
+LONGEST_GLITCH = 0.2  # longest glitch, as a share of the record's time and of its travel; chosen by trial
 CHANGE = 3.0  # cost of a change of rate, in units of a misfit of `RATE_SIGMAS` standard errors; chosen by trial
-FRAGMENT = 0.1  # cost of leaving out a piece, besides the cost of its length; chosen by trial:
-SHORTEST = 0.05  # share of the record (time or displacement) that costs as much as a change of rate; chosen by trial
-SLIP = 0.01  # longest slip of the sensor, as share of the time of a record; chosen by trial
-MAIN = 0.6  # share of what is left out between two pieces that a piece needs to be a run of its own; chosen by trial
-LEAD = 8.0  # displacement by which rates must differ over a run, in standard deviations of the noise; chosen by trial
-STRAIGHT = 20  # samples on one line from which a part that is over soon is no slip of the sensor, which is over at once
-PLAIN = 100.0  # the same displacement that makes a piece a run of its own, however short; chosen by trial
-RELIABLE, FEWEST = 8, 5  # samples of such a piece, within a run and at an end of the record; chosen by trial
+FRAGMENT = 0.1  # cost of leaving out a piece, in addition to the cost of its length; chosen by trial
+SHORTEST = 0.05  # leaving out this share of the record (time or travel) costs as much as a change; chosen by trial
+SLIP = 0.01  # longest slip of the sensor, as a share of the record's time; chosen by trial
+MAIN = 0.6  # least share of the samples left out between two pieces that form a separate run; chosen by trial
+LEAD = 8.0  # least travel by which rates differ over a run, in standard deviations of the noise; chosen by trial
+STRAIGHT = 20  # a short part with this number of samples on a line is no slip of the sensor, which is sudden
+PLAIN = 100.0  # travel by which rates differ that makes a piece of any length a separate run; chosen by trial
+RELIABLE, FEWEST = 8, 5  # least number of samples of such a piece: within a run, at an end of the record; by trial
 HELD, FLAT = 20.0, 4
-"""Standard deviations of the noise by which a brief hold must part the lines beside it, and samples at rest in it."""
-COARSE = 20_000  # samples above which means are segmented, to bound the time; chosen by trial
+"""Least distance between the lines before and after a brief hold, in standard deviations of the noise; least number of
+samples at rest in it."""
+COARSE = 20_000  # above this number of samples, means are segmented instead, to limit the time; chosen by trial
 
 
 @dataclass
 class Run:
-    """Samples with one common rate.
+    """Samples of a displacement with one common rate.
 
     Attributes
     ----------
     members : list of (int, int)
-        Ranges of samples, in order; gaps between them are glitches.
+        Ranges of samples (first, one past the last), in order; gaps between them are glitches.
     rate : float
         m/s.
     groups : list of int
-        Sensor level of each member.
+        Index in `levels` of each member; it grows by 1 at each slip of the sensor.
     levels : ndarray (groups,)
         Displacement of the line of each sensor level at the first time of the record, m.
     """
@@ -70,7 +71,7 @@ class Run:
         return np.concatenate([np.arange(i, j) for i, j in self.members])
 
     def reversed(self, time: Array) -> Run:
-        """Run of the reversed record (see `ends.reversed_column`)."""
+        """Same run as found in the record reversed in time and sign (see `ends.reversed_column`)."""
         count, span = len(time), float(time[-1] - time[0])
         members = [(count - j, count - i) for i, j in reversed(self.members)]
         groups = [self.groups[-1] - group for group in reversed(self.groups)]
@@ -78,7 +79,7 @@ class Run:
 
 
 class _Pieces:
-    """Lines through ranges of samples, with their errors."""
+    """Straight lines through ranges of samples, with their errors; each attribute has one value for each line."""
 
     def __init__(self, time: Array, values: Array, ends: list[tuple[int, int]], noise: Array) -> None:
         self.ends = ends
@@ -105,15 +106,15 @@ class _Pieces:
 
 
 def straight_runs(time: Array, displacement: Array, lasting: Array | None = None) -> list[Run]:
-    """Runs of a displacement, in order of time; neighbours differ in rate.
+    """Straight runs of a displacement, in order of time; neighbours differ in rate.
 
     Parameters
     ----------
     time, displacement : ndarray (n,)
         s, m.
     lasting : ndarray (n,), optional
-        Standard deviation (m) of independent noise of each sample that hides as much as that of the sensor does, where
-        it is correlated and the difference of neighbours shows a part of it only.
+        Standard deviation (m) of independent noise, at each sample, that would hide as much as the correlated noise of
+        the sensor. It is needed because differences of neighbouring samples show correlated noise only in part.
     """
     lasting = np.zeros(len(time)) if lasting is None else lasting
     step = -(-len(time) // COARSE)
@@ -131,7 +132,7 @@ def straight_runs(time: Array, displacement: Array, lasting: Array | None = None
 
 
 def _runs_of(time: Array, displacement: Array, lasting: Array) -> list[Run]:
-    """Runs of a displacement of few samples."""
+    """Straight runs of a displacement, by segmentation of all its samples."""
     noise = np.maximum(displacement_noise(time, displacement), lasting)
     pieces = _Pieces(time, displacement, split(time, displacement, noise, linear=True), noise)
     groups = _with_holds(_segmented(pieces), pieces)
@@ -147,9 +148,9 @@ def _runs_of(time: Array, displacement: Array, lasting: Array) -> list[Run]:
 
 
 def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: Array, lasting: Array) -> list[Run]:
-    """Add runs of the few samples before the first run and after the last, where they determine a rate.
+    """Runs with further runs of a few samples before the first and after the last, if these determine a rate.
 
-    A very short run at an end is examined again, because its ranges may contain a change of rate.
+    A very short run at an end is removed and examined again, because its ranges may contain a change of rate.
     """
     found, count = list(runs), len(time)
     if len(found) > 1 and found[0].last <= RELIABLE:
@@ -184,7 +185,7 @@ def _with_exact_boundaries(runs: list[Run], step: int, time: Array, displacement
 
 
 def _parted_by_holds(run: Run, time: Array, displacement: Array, noise: Array, lasting: Array) -> list[Run]:
-    """Parts of a run before, within and after holds so brief that they seem to be slips of the sensor."""
+    """Runs before, within and after each hold that is so brief that it was taken for a slip of the sensor."""
     parts, own = [], [run.members[0]]
     for k, other in enumerate(run.members[1:]):
         lines = [run.levels[group] + run.rate * (time - time[0]) for group in run.groups[k : k + 2]]
@@ -202,13 +203,13 @@ def _parted_by_holds(run: Run, time: Array, displacement: Array, noise: Array, l
 def _brief_hold(
     lines: list[Array], rate: float, rows: slice, displacement: Array, noise: float
 ) -> tuple[int, int] | None:
-    """Range of samples at rest that leads from one line to the next of the same rate; None if the sensor slipped."""
+    """Range of samples at rest between two lines of the same rate; None if the samples show a slip of the sensor."""
     x, before, after = (column[rows] for column in (displacement, *lines))
     drop = float(before[0] - after[0])
     if drop * rate <= 0 or abs(drop) < HELD * noise:
         return None
     level, sign = float(np.median(x)), np.sign(rate)
-    for _ in range(3):  # which samples are at rest depends on the level, and the level on these
+    for _ in range(3):  # the level depends on which samples are at rest, and these depend on the level
         flat = (sign * (before - level) > 0) & (sign * (after - level) < 0)
         if np.sum(flat) < FLAT:
             return None
@@ -221,9 +222,9 @@ def _brief_hold(
 def _joined_across_flanks(
     runs: list[Run], time: Array, displacement: Array, noise: Array, lasting: Array | None = None
 ) -> list[Run]:
-    """Join runs across a short one after which the displacement continues as before: the flank of a glitch.
+    """Runs joined across the flanks of glitches: short runs after which the displacement continues as before.
 
-    The bottom of a glitch may look like a sensor level, so that its flank alone looks like a change of rate.
+    The bottom of a glitch may look like a new level of the sensor; its flank then looks like a run of another rate.
     """
     runs, i = list(runs), 0
     while i < len(runs) - 2:
@@ -237,7 +238,7 @@ def _joined_across_flanks(
 
 
 def _is_continued(before: Run, middle: Run, after: Run, time: Array, noise: Array) -> bool:
-    """True if two runs are on one line, beyond a short run between them."""
+    """True if two runs are on one line and the run between them is short."""
     if time[middle.last - 1] - time[middle.first] > LONGEST_GLITCH * (time[-1] - time[0]):
         return False
     at, errors, lines = 0.5 * (time[middle.first] + time[middle.last - 1]), [], []
@@ -254,10 +255,10 @@ def _is_continued(before: Run, middle: Run, after: Run, time: Array, noise: Arra
 
 
 def _segmented(pieces: _Pieces) -> list[list[int]]:
-    """Pieces of each run, by the segmentation of least cost: changes of rate and pieces left out have a cost.
+    """Indices of the pieces of each run, by the segmentation of least cost.
 
-    Every piece either has the rate of its run within its error, or is left out at a cost that grows with its length.
-    The optimum over the rates of all pieces is found by dynamic programming.
+    A piece either has the rate of its run within its error, or is left out at a cost that grows with its length; each
+    change of rate also has a cost. Dynamic programming finds the optimum over the rates of all pieces.
     """
     count = len(pieces.ends)
     error = np.hypot(pieces.slope_error, LIKE / RATE_SIGMAS * np.abs(pieces.slope))
@@ -278,7 +279,7 @@ def _segmented(pieces: _Pieces) -> list[list[int]]:
     own[-1] = int(np.argmin(total[-1]))
     for k in range(count - 1, 0, -1):
         own[k - 1] = origin[k, own[k]]
-    inside = cost[everyone, own] < price * (1 - 1e-9)  # beyond rounding
+    inside = cost[everyone, own] < price * (1 - 1e-9)  # smaller by more than rounding
     inside |= everyone == own
     found: list[list[int]] = []
     for k in range(count):
@@ -290,7 +291,7 @@ def _segmented(pieces: _Pieces) -> list[list[int]]:
 
 
 def _with_holds(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
-    """Split off pieces that lead away from a run's line for good, such as short holds."""
+    """Indices of the pieces of each run, after separation of pieces that leave a run's line for good (short holds)."""
     found = []
     for members in groups:
         rate, _ = _mean_slope(members, pieces)
@@ -308,9 +309,9 @@ def _with_holds(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
 
 
 def _separate_run(inner: Array, rate: float, gap: float | None, pieces: _Pieces) -> list[int]:
-    """Pieces (of those left out of a run) that are a run of their own.
+    """Indices of pieces, among the pieces `inner` left out of a run, that form a separate run; empty if none do.
 
-    Within a run, a `gap` (s) that is over soon is a slip of the sensor. At an end of the record the gap is None.
+    A short `gap` (s) within a run is a slip of the sensor. At an end of the record, the gap is None.
     """
     if not len(inner):
         return []
@@ -324,7 +325,7 @@ def _separate_run(inner: Array, rate: float, gap: float | None, pieces: _Pieces)
     whole = np.sum(pieces.size[main]) > MAIN * np.sum(pieces.size[inner]) and np.sum(pieces.size[main]) >= (
         RELIABLE if gap is not None else FEWEST
     )
-    # at rest within its error, which must be small beside the rate
+    # at rest within its error, which must be small compared with the rate
     still = abs(slope) < 0.02 * abs(rate) + RATE_SIGMAS * error and RATE_SIGMAS * error < 0.05 * abs(rate)
     far = np.sum(pieces.lengths[main]) > SHORTEST or abs(np.sum(away)) > PLAIN * usual
     long = (gap is None or gap > SLIP * pieces.span or pieces.size[longest] >= STRAIGHT) and far
@@ -332,7 +333,7 @@ def _separate_run(inner: Array, rate: float, gap: float | None, pieces: _Pieces)
 
 
 def _without_glitches(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
-    """Remove runs that are parts of a glitch: excursions that return, or that are off the lines of both neighbours."""
+    """Runs without parts of glitches: excursions that return, or that are off the lines of both neighbours."""
     groups = list(groups)
     i = 0
     while i < len(groups) - 2:
@@ -382,7 +383,7 @@ def _mean_slope(members: list[int], pieces: _Pieces) -> tuple[float, float]:
 
 
 def _joined_by_rate(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
-    """Join neighbours whose rates agree."""
+    """Runs after joining neighbours whose rates agree."""
     found: list[list[int]] = []
     for members in groups:
         if found and _rates_agree(_mean_slope(found[-1], pieces), _mean_slope(members, pieces)):
@@ -393,7 +394,7 @@ def _joined_by_rate(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]
 
 
 def _joined_across_wander(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
-    """Join runs separated by slow wander of the displacement instead of a change of rate, the weakest first."""
+    """Runs after joining those that differ by less than slow wander of the displacement, the least different first."""
     groups = list(groups)
     while len(groups) > 1:
         slopes = np.array([_mean_slope(members, pieces)[0] for members in groups])
@@ -409,9 +410,10 @@ def _joined_across_wander(groups: list[list[int]], pieces: _Pieces) -> list[list
 
 
 def fitted_run(run: Run, time: Array, displacement: Array, lasting: Array | None = None) -> Run:
-    """Run with its rate and sensor levels from a robust line; members on one level share it.
+    """Run with its rate and sensor levels from a robust line; members that agree are given the same level.
 
-    Levels are told apart by the scatter of the samples, or by `lasting` (see `straight_runs`) if that is more.
+    Levels differ if their difference exceeds its error, from the scatter of the samples or from `lasting` (see
+    `straight_runs`) if that is larger.
     """
     lasting = np.zeros(1) if lasting is None else lasting[run.rows]
     groups = list(range(len(run.members)))
@@ -433,7 +435,7 @@ def fitted_run(run: Run, time: Array, displacement: Array, lasting: Array | None
 def _robust_line(
     run: Run, groups: list[int], time: Array, displacement: Array, lasting: Array
 ) -> tuple[float, Array, Array, Array, float]:
-    """Rate, levels, their mean times and errors, error of the rate; outliers have low weight."""
+    """Rate, levels, their mean times and errors, and error of the rate, from a line with low weight of outliers."""
     rows = run.rows
     own = np.repeat(groups, [j - i for i, j in run.members])
     t, x = time[rows] - time[0], displacement[rows]

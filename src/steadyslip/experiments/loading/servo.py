@@ -1,9 +1,9 @@
 """Response of a servo to a step of the commanded rate: it follows late, and may overshoot.
 
-The rate of the load point answers as a second-order system does, with poles s₁, s₂: a share
-g(t) = 1 − (s₂ exp(s₁ t) − s₁ exp(s₂ t)) / (s₂ − s₁) of the step is made a time t after the command. Far from the step
-the load point is behind the command by the step times `lag` = 2 ζ/ω, so that the lines through its displacement before
-and after meet `lag` after the command.
+The rate of the load point responds as a second-order system with poles s₁, s₂: a time t after the command, it has made
+the share g(t) = 1 − (s₂ exp(s₁ t) − s₁ exp(s₂ t)) / (s₂ − s₁) of the step. Long after the step, the load point is
+behind the command by the step times `lag` = 2 ζ/ω, so that the lines through its displacement before and after the step
+meet a time `lag` after the command.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import numpy as np
 from steadyslip.core.arrays import Array
 
 DAMPINGS = (0.2, 0.35, 0.6, 1.05, 2.0, 8.0)
-"""Damping ratios from which a search starts: overshoot of 53 % down to none, and a single exponential."""
+"""Damping ratios from which a search starts: from an overshoot of 53 % to none, and nearly a single exponential."""
 GAIN = 8.0
-"""Decrease of chi squared by which a servo must fit better than steps or ramps. Of 670 records without one, with white
-or correlated noise, one reached 9.4, the next 7.4."""
-SETTLED = 1e-3  # share of a step that is left when it counts as made
-PIECES = 24  # straight ramps that stand for a response: its rate is then right to a hundredth of the step
+"""Decrease of chi squared by which a servo must fit better than steps or ramps. In 670 records without a servo, with
+white or correlated noise, the largest decrease was 9.4, the next 7.4."""
+SETTLED = 1e-3  # a step is complete when this share of it is left
+PIECES = 24  # number of straight ramps that approximate a response: its rate is then right to 1 % of the step
 
 
 def _poles(lag: float, damping: float) -> tuple[complex, complex]:
@@ -31,9 +31,9 @@ def _poles(lag: float, damping: float) -> tuple[complex, complex]:
 
 
 def late_response(since: Array, lag: float, damping: float) -> tuple[Array, Array]:
-    """Displacement (s) and share of the rate that a servo has made at times `since` the command (s) of a step of 1.
+    """Displacement (s) and rate of a servo at times `since` (s) after the command of a unit step of the rate.
 
-    Solution of x'' + 2 ζ ω x' + ω² (x - t) = 0 from rest, with ω = 2 ζ/lag.
+    They solve x'' + 2 ζ ω x' + ω² (x - t) = 0 from rest, with ω = 2 ζ/lag.
     """
     one, other = _poles(lag, damping)
     t = np.maximum(since, 0.0)
@@ -48,13 +48,13 @@ def late_response(since: Array, lag: float, damping: float) -> tuple[Array, Arra
 
 
 def settling(lag: float, damping: float) -> float:
-    """Time (s) after the command at which all but `SETTLED` of a step is made."""
+    """Time (s) after the command at which all but a share `SETTLED` of a step is done."""
     return float(-np.log(SETTLED) / min(-pole.real for pole in _poles(lag, damping)))
 
 
 @lru_cache(maxsize=256)
 def ramps(lag: float, damping: float) -> tuple[tuple[float, float, float], ...]:
-    """Straight ramps that stand for a response: begin after the command (s), duration (s) and share of the step."""
+    """Straight ramps that approximate a response: begin after the command (s), duration (s) and share of the step."""
     t = np.linspace(0.0, settling(lag, damping), 4000)
     bend = np.sqrt(np.abs(np.gradient(np.gradient(late_response(t, lag, damping)[1], t), t)))
     along = np.concatenate([[0.0], np.cumsum(0.5 * (bend[1:] + bend[:-1]) * np.diff(t))])
@@ -65,5 +65,5 @@ def ramps(lag: float, damping: float) -> tuple[tuple[float, float, float], ...]:
 
 
 def overshoot(damping: float) -> float:
-    """Largest share of a step by which the rate passes its new level."""
+    """Largest overshoot of the rate beyond its new level, as a share of the step."""
     return float(np.exp(-np.pi * damping / np.sqrt(1 - damping**2))) if damping < 1 else 0.0

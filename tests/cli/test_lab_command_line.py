@@ -69,7 +69,7 @@ def test_from_estimates_to_a_verdict(fitted):
         ([BASALT, "examples/fits/basalt.toml", "examples/fits/sepiolite.toml"], ["allowed: one"]),
         ([BASALT, "--set", "fit.trend=x"], ["fit.trend: got 'x'; allowed: a whole number from 0 to 6"]),
         ([BASALT, "--set", "fit.tend=1"], ["unknown key 'tend'; did you mean 'trend'?"]),
-        ([BASALT, "--set", "record.normal=kPa"], ["is in MPa by its name, but kPa is asked for"]),
+        ([BASALT, "--set", "record.normal=kPa"], ["is in MPa by its name, but the option says kPa"]),
         ([BASALT, "--set", "record.friction=Mu"], ["unknown column 'Mu'", "allowed: Time(s), "]),
         ([BASALT, "--set", "record.between=[0, 10]"], ["leaves 0 samples"]),
         ([BASALT, "--set", "friction.evolution=agin"], ["did you mean 'aging'?"]),
@@ -183,7 +183,7 @@ def test_a_table_of_speeds_without_its_law_is_named(tmp_path):
     """Five rows are no record: the message was of a time column, or of a file without numbers."""
     table = tmp_path / "guide.csv"
     table.write_text("speed [mm/s];force [N]\n0.1;610\n0.5;500\n1;450\n5;400\n20;357\n")
-    assert "is a table of speeds and friction" in (said := run("fit", table).stderr)
+    assert "is a table of friction over speed" in (said := run("fit", table).stderr)
     assert "--law lugre" in said
     assert "-o: a rig as .toml" in run("fit", table, "-o", tmp_path / "guide.toml").stderr
     assert "law: unknown friction law 'foo'" in run("fit", table, "--law", "foo").stderr

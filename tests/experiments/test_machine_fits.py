@@ -237,8 +237,8 @@ MOTION = motion_from_arrays(TIMES, {"table.x": ringing(40.0, 0.3, 1.5, 0.1)})
     ([], {"protocol": STEP}, r"nothing is free; name parameters such as links\.spring\.stiffness"),
     (["spring.stifness"], {"protocol": STEP}, "spring.stiffness"),
     (["spring.stiffness"], {}, "nothing disturbs the machine.*initial = 'free'"),
-    (["spring.stiffness"], {"protocol": STEP, "drive": "smoothed"}, "drive: has no effect on a machine"),
-    (["spring.stiffness"], {"protocol": STEP, "loss": "huber"}, "loss: has no effect on a machine"),
+    (["spring.stiffness"], {"protocol": STEP, "drive": "smoothed"}, "drive: has no effect on a fit of a machine"),
+    (["spring.stiffness"], {"protocol": STEP, "loss": "huber"}, "loss: has no effect on a fit of a machine"),
     (["table.force"], {"protocol": STEP, "calibrated": 1e9}, "calibrated: has no effect"),
     (["friction.mu_static"], {"protocol": STEP, "trend": 9}, "trend: got 9"),
 ])  # fmt: skip
@@ -265,7 +265,7 @@ def test_a_column_of_no_such_motion_or_unit_is_told(columns, words, tmp_path):
     ("time (s),place (um)", {"table.x": "plase"}, "plase.*place"),
     ("time (s),place (um)", None, "no heading is a name such as"),
     ("clock,place (um)", {"table.x": "place"}, "time: no column for it"),
-    ("time (s),place (um)", {"table.x": ("place", "mm")}, "is in um by its heading, but mm is asked for"),
+    ("time (s),place (um)", {"table.x": ("place", "mm")}, "is in um by its heading, but the option says mm"),
     ("time (s),place (um)", {"table.x": 3}, "3"),
 ])  # fmt: skip
 def test_a_file_that_does_not_say_what_is_what_is_refused(head, columns, words, tmp_path):
@@ -347,7 +347,7 @@ def test_the_command_fits_a_machine_by_its_file(tmp_path):
 
 @pytest.mark.parametrize(("text", "words"), [
     (FILE.replace('free = ["links.screw.stiffness", "links.screw.damping"]', "offset = true"), "fit.free: missing"),
-    (FILE.replace("[fit]", 'normal = "MPa"\n[fit]'), "record.normal.*says nothing of a machine"),
+    (FILE.replace("[fit]", 'normal = "MPa"\n[fit]'), "record.normal.*has no meaning for a machine"),
     (FILE + "[population]\n", "population: needs fits of sliders"),
     (FILE.replace('"encoder"', "true"), "record.columns.*a table of names and headings"),
 ])  # fmt: skip
@@ -369,5 +369,5 @@ def test_what_is_not_offered_is_refused():
     for machine in (plate, *([held] if isinstance(held, ss.Machine) else [])):
         with pytest.raises(ss.NotAvailable, match="fits are not offered for a machine"):
             ss.fit(machine, MOTION, ["spring.stiffness"], protocol=STEP)
-    with pytest.raises(ss.ParameterError, match=r"allowed for a machine: what experiments\.read_motion"):
+    with pytest.raises(ss.ParameterError, match=r"allowed for a machine: a record from experiments\.read_motion"):
         ss.fit(oscillator(), "ring.csv", ["spring.stiffness"])

@@ -229,7 +229,7 @@ def test_rocks_that_have_a_minus_b_alike_tell_of_the_next_one():
     assert shares.pop("b") is False  # of a − b, which may be 0
     assert set(shares) > {"friction.a", "friction.b"}
     assert all(shares.values())
-    assert "differ together friction.a and friction.b" in text
+    assert "correlated      friction.a and friction.b" in text
     found = rock.others(3)
     np.testing.assert_allclose(found["a - b"], found["friction.a"] - found["friction.b"], rtol=1e-12)
     soft, stiff = (ss.predict(lab.rig().with_values({"slider.stiffness": k}), rock) for k in (1e9, 1e10))
@@ -273,7 +273,7 @@ def test_other_conditions_move_means_and_what_follows(fits):
     assert "another experiment of a population at normal stress 20 MPa" in told
     assert "means           at normal stress 5 MPa" in str(ends[5e6])
     there = str(rock.at({"normal stress": 40e6}))
-    assert "! normal stress 40 MPa is beyond 5 MPa to 20 MPa" in there
+    assert "! normal stress 40 MPa is outside 5 MPa to 20 MPa" in there
     assert "mean at normal stress 40 MPa " in there
     assert "another experiment at normal stress 40 MPa, 95 %" in there
     with pytest.raises(ss.ParameterError, match=r"where: got 40000000\.0; allowed: numbers by the name of a condition"):

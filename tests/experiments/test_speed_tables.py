@@ -222,7 +222,7 @@ def test_a_radius_is_of_what_turns(tmp_path):
     path.write_text("v [mm/s],F [N]\n1,50\n2,40\n5,33\n9,30\n20,29\n")
     done = command("fit", path, "--law", "coulomb", "--set", "radius=40 mm")
     assert done.returncode == 2
-    assert "radius: is of a table of torques, over rpm or rad/s; leave it out" in done.stderr
+    assert "radius: applies only to torques over rpm or rad/s; leave it out" in done.stderr
 
 
 def test_five_points_are_enough():

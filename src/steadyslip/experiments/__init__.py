@@ -1,8 +1,8 @@
-"""Records of experiments: read them, fit rigs to them, say how sure that is and what follows for another rig.
+"""Records of experiments: reading, fits of rigs to them, uncertainty of the fits, and predictions for other rigs.
 
-Knows no verdicts, maps or figures: fits come back as numbers and records.
+Does not import verdicts, maps or figures: results are numbers and records.
 
-Names are listed in ``__init__.pyi`` and loaded on first use: the process that reads a file from outside needs few.
+Names are listed in ``__init__.pyi`` and loaded on first use: the separate process that reads data files needs few.
 """
 
 import lazy_loader

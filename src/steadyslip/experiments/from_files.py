@@ -1,4 +1,4 @@
-"""Fit records in files, as the command line does: from paths to a fit or a population."""
+"""Fits and populations from the paths of record files, as on the command line."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Paths = Sequence[str | PathLike[str]]
 
 
 def spec_of(spec: str | PathLike[str] | None, changes: Iterable[str] = ()) -> Spec | MachineSpec:
-    """Read a fit file; without one, the one-state slip law at the measured normal stress."""
+    """Contents of a fit file; without a file, those for the one-state slip law at the measured normal stress."""
     text = "[friction]\n" if spec is None else text_of(spec)
     return spec_from_text(text, "default" if spec is None else str(spec), changes)
 
@@ -36,14 +36,14 @@ def spec_of(spec: str | PathLike[str] | None, changes: Iterable[str] = ()) -> Sp
 def fit_files(
     paths: Paths, spec: str | PathLike[str] | None = None, changes: Iterable[str] = (), *, skip_bad_lines: bool = False
 ) -> tuple[Fit | MachineFit, LawComparison | None]:
-    """Read records and fit them, as the command line does; shows progress on a terminal.
+    """Fit to records in files, as on the command line; shows progress on a terminal.
 
     Parameters
     ----------
     paths : sequence of path
-        Records, fitted together.
+        Files of the records, which are fitted together.
     spec : path, optional
-        The file of the fit; one-state slip law at the measured normal stress unless given.
+        Fit file; by default the one-state slip law at the measured normal stress is fitted.
     changes : iterable of str
         As for `read_spec`.
     skip_bad_lines : bool
@@ -51,15 +51,15 @@ def fit_files(
     Returns
     -------
     fit : Fit or MachineFit
-        The best, where laws are compared; of a machine if the file describes one.
+        The best fit, if laws are compared; a MachineFit if the file describes a machine.
     comparison : LawComparison or None
-        Comparison of the laws that the file lists; if it lists none and the normal stress changes, of the slip and the
-        aging law with each memory of it, unless the file chooses a memory. None for a single law.
+        Comparison of the laws that the file lists. If it lists none, the normal stress changes and the file chooses no
+        memory of normal stress, the slip and the aging law are compared with each memory. None for a single law.
 
     Raises
     ------
     ParameterError
-        Listing everything that is wrong with the files: of all records, and of the file of the fit.
+        If records or the fit file have faults; lists all of them.
 
     Examples
     --------
@@ -72,7 +72,7 @@ def fit_files(
 
 
 def fitted(plan: Spec | MachineSpec, records: Sequence[Any]) -> tuple[Fit | MachineFit, LawComparison | None]:
-    """Fit records as their file asks; see `fit_files`."""
+    """Fit to records, or comparison of laws, as the fit file requires; see `fit_files`."""
     with progress_text("searching") as said:
         report = _progress_reporter(said)
         if isinstance(plan, Spec) and plan.compared(records):
@@ -85,14 +85,14 @@ def fitted(plan: Spec | MachineSpec, records: Sequence[Any]) -> tuple[Fit | Mach
 def population_files(
     paths: Paths, spec: str | PathLike[str], changes: Iterable[str] = (), *, skip_bad_lines: bool = False
 ) -> Population:
-    """Read records, fit each on its own and pool what they say, as the command line does; shows progress on a terminal.
+    """Population from fits to each of several record files, as on the command line; shows progress on a terminal.
 
     Parameters
     ----------
     paths : sequence of path
-        Records, each an experiment of its own.
+        Files of the records, each of which is a separate experiment.
     spec : path
-        The file of the fit; its table ``[population]`` says which parameters differ, and on what they may depend.
+        Fit file; its table ``[population]`` names the parameters that differ and the condition on which they depend.
     changes : iterable of str
         As for `read_spec`.
     skip_bad_lines : bool
@@ -100,12 +100,12 @@ def population_files(
     Returns
     -------
     Population
-        Its experiments labelled by the names of the files.
+        Its experiments have the names of the files as labels.
 
     Raises
     ------
     ParameterError
-        Listing everything that is wrong with the files, or if they do not determine a population.
+        If the files have faults (lists all of them) or do not determine a population.
     NotAvailable
         If emcee is not installed.
 
@@ -141,7 +141,7 @@ def population_files(
     if given is not None and len(given) != len(records):
         message = f"got {len(given)}; allowed: {len(records)}, one for each record"
         raise ParameterError([Problem("population.values", message)])
-    plan = plan.referred_to(records[0])  # all levels of friction at one rate
+    plan = plan.referred_to(records[0])  # levels of friction must refer to the same velocity
     fits: dict[str, Fit] = {}
     with progress_text("searching") as said:
         for label, record in zip(labels, records, strict=True):
@@ -152,18 +152,18 @@ def population_files(
 
 
 def load_friction(path: str | PathLike[str]) -> Fit | Population:
-    """Read a saved fit, or a saved population, whichever the file holds.
+    """Saved fit or saved population, whichever the file contains.
 
     Raises
     ------
     NotAvailable
-        As `load_fit` and `load_population`.
+        If the file contains neither, is damaged, or cannot be read.
     """
     return load_population(path) if holds(path, POPULATION) else load_friction_fit(path)
 
 
 def records_of(plan: Spec | MachineSpec, paths: Paths, skip_bad_lines: bool) -> list[Any]:
-    """Read all records; one error lists the problems of all files."""
+    """Records of all files; one error lists the problems of all files."""
     records, faults = [], []
     for path in paths:
         try:
@@ -178,7 +178,7 @@ def records_of(plan: Spec | MachineSpec, paths: Paths, skip_bad_lines: bool) -> 
 
 
 def _of_speeds(path: str | PathLike[str], error: ParameterError | NotAvailable) -> NotAvailable | None:
-    """Error that says how to fit a table of speeds, where a file without times is one; else None."""
+    """Error with advice on fitting a table of speeds, if a file without times is such a table; else None."""
     if isinstance(error, ParameterError) and all(problem.name != "time" for problem in error.problems):
         return None
     try:
@@ -186,8 +186,8 @@ def _of_speeds(path: str | PathLike[str], error: ParameterError | NotAvailable) 
     except SteadyslipError:
         return None
     return NotAvailable(
-        f"{str(path)!r} is a table of speeds and friction, no record in time; say which law to fit with --law, such as "
-        "--law lugre, or call experiments.fit_friction_table in Python"
+        f"{str(path)!r} is a table of friction over speed, not a record over time; name the law to fit with --law, "
+        "such as --law lugre, or call experiments.fit_friction_table in Python"
     )
 
 

@@ -1,4 +1,4 @@
-"""`fit_friction_table`: a friction law from friction that was measured at constant speeds."""
+"""Fits of a friction law to a table of friction at constant speeds (`fit_friction_table`)."""
 
 from __future__ import annotations
 
@@ -46,35 +46,35 @@ def fit_friction_table(
 ) -> SpeedFit:
     """Fit a friction law to friction that was measured at constant speeds.
 
-    Each direction is fitted alone. Parameters that the rows are too few for are held: the Stribeck exponent at 2, then
-    the viscosity at 0. Where the load differs between rows, load that presses beside it and viscous drag that does not
-    follow it are fitted as well.
+    Each direction is fitted separately. If there are too few rows for all parameters, some are held: the Stribeck
+    exponent at 2, then the viscosity at 0. If the load differs between rows, a constant load in addition to it and a
+    viscous drag that does not depend on it are fitted too.
 
     Parameters
     ----------
     table : path, or mapping of str to array_like
-        File with columns of speed, force or torque or friction coefficient, and optionally of load and direction; or
+        File with columns of speed, of force, torque or friction coefficient, and optionally of load and direction; or
         arrays by these names in SI units, ``{"speed": [...], "force": [...]}``. Negative speeds are backward.
     law : str
         Registered name of a friction law.
     load : float or str, optional
-        Constant load, N, if there is no column of it. Without any load, coefficients are forces.
+        Constant load, N, if the table has no column for it. Without any load, coefficients are forces.
     loop : path, optional
-        Table of displacement and force before sliding, which tells the stiffness of bristles.
+        Table of displacement and force before sliding, from which the stiffness of bristles follows.
     hold : mapping of str to float or str, optional
-        Parameters of the law that are known.
+        Known parameters of the law, which are not fitted.
     errors : str
-        ``"relative"`` if each error is a share of the friction measured, as of a gauge of 1 % of its reading;
-        ``"absolute"`` if they are of one size, as of 1 % of full scale.
+        ``"relative"`` if errors are in proportion to the measured friction, such as 1 % of the reading; ``"absolute"``
+        if all have the same size, such as 1 % of full scale.
     radius : float or str, optional
-        Of the contact of a table of torques, m, at which the rig file has its friction; 1 m unless given.
+        Radius of the contact, m, for a table of torques: friction in the rig file acts there; by default 1 m.
     **columns
-        Column or unit by role where names do not tell: ``speed="mm/min"``, ``force="F2"``.
+        Column or unit by role, if the names of columns do not suffice: ``speed="mm/min"``, ``force="F2"``.
 
     Returns
     -------
     SpeedFit
-        Estimates with errors and 68 and 95 % intervals; prints itself; `rig_text` is a rig file.
+        Estimates with errors and 68 and 95 % intervals; `print` shows them, and `rig_text` is a rig file.
 
     Raises
     ------
@@ -85,8 +85,9 @@ def fit_friction_table(
 
     Notes
     -----
-    Intervals hold the values at which the least sum of squares of the other parameters exceeds the overall one by no
-    more than s² t², with s² from the residuals and Student's t for rows less parameters.
+    An interval contains the values at which the sum of squares, minimised over the other parameters, exceeds its
+    minimum by no more than s² t². The variance s² follows from the residuals; Student's t has as many degrees of
+    freedom as there are more rows than parameters.
 
     Examples
     --------
@@ -111,7 +112,7 @@ def fit_friction_table(
         read = read_speed_table(table, load=load, **columns)
     if radius is not None:
         if not read.turns:
-            raise ParameterError([Problem("radius", "is of a table of torques, over rpm or rad/s; leave it out")])
+            raise ParameterError([Problem("radius", "applies only to torques over rpm or rad/s; leave it out")])
         read = replace(read, radius=checked_option("radius", radius, "m", read.source))
     kind = _law(law)
     held = _held(kind, hold or {})
@@ -128,7 +129,7 @@ def fit_friction_table(
                 [
                     Problem(
                         "loop",
-                        "of a rotation where the table is of sliding, or the reverse; give both of the same motion",
+                        "is for a rotation and the table for sliding, or the reverse; give both for the same motion",
                     )
                 ]
             )
@@ -137,7 +138,7 @@ def fit_friction_table(
 
 
 def _law(name: str) -> Any:
-    """Friction law by registered name; ParameterError naming the argument if there is none."""
+    """Friction law of a registered name; raises a ParameterError on the argument ``law`` if there is none."""
     try:
         return find_law(FrictionLaw, name)
     except ParameterError as error:
@@ -145,7 +146,7 @@ def _law(name: str) -> Any:
 
 
 def _held(law: Any, given: Mapping[str, Any]) -> dict[str, float]:
-    """Held parameters in SI units."""
+    """Held parameters of a law in SI units, by name."""
     found, problems = {}, []
     roles = {item.name: role for item in fields(law) if isinstance(role := role_of(item), Parameter)}
     for name, value in given.items():
@@ -161,7 +162,7 @@ def _held(law: Any, given: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _number(value: Any) -> Any:
-    """A number from a text that is one; other values unchanged, to be checked by what reads them."""
+    """Number from a text without a unit; other values are returned unchanged."""
     try:
         return float(value)
     except (TypeError, ValueError):
@@ -169,12 +170,12 @@ def _number(value: Any) -> Any:
 
 
 def fit_speed_files(files: Sequence[Path], law: str, changes: Sequence[str]) -> SpeedFit:
-    """Fit the tables of a command line: one of speeds, and perhaps a loop before sliding.
+    """Fit to the tables given on a command line: one of speeds, and optionally a loop before sliding.
 
     Raises
     ------
-    ParameterError
-        If there is more than one table of speeds or loop.
+    NotAvailable
+        If there is not exactly one table of speeds, or more than one loop.
     """
     loops = [path for path in files if is_loop(path)]
     tables = [path for path in files if path not in loops]

@@ -1,4 +1,4 @@
-"""Fit files of machines: a rig file with bodies and links, and tables on records and the fit."""
+"""Fit files of machines: rig files with bodies and links, and with tables ``[record]`` and ``[fit]``."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.protocol import Protocol
 
 READ = ("time", "columns", "table", "between", "sampling", "skip_bad_lines", "averages")
-"""Keys of ``[record]`` that say something about a machine's record."""
+"""Keys of ``[record]`` that are allowed for a machine."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class MachineSpec(Displayed):
     population: ClassVar[None] = None
 
     def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> MotionRecord | ResponseData:
-        """Read a record with the settings of the file: responses over frequency, or motions over time."""
+        """Record of a machine, read with the settings of the file: frequency responses, or motions over time."""
         if is_response(path):
             return read_frequency_response(path, averages=self.record.averages)
         options = {name: value for name, value in self.record.arguments().items() if name != "averages"}
@@ -61,21 +61,21 @@ class MachineSpec(Displayed):
         return read_motion(path, **options)
 
     def fit(self, records: Sequence[MotionRecord | ResponseData], **changes: Any) -> MachineFit:
-        """Fit the records with the settings of the file, but for those given here, as for `steadyslip.fit`."""
+        """Fit to records with the settings of the file; `changes`, as for `steadyslip.fit`, replace some of them."""
         refuse_unknown("MachineSpec.fit", changes, keywords_of(fit, ["rig", "records"]))
         return fit_machine(self.rig, records, **(self.options | {"protocol": self.protocol} | changes))
 
     def compared(self, records: Sequence[Any]) -> tuple[str, ...]:
-        """Labels of laws to compare; none."""
+        """Empty tuple: friction laws of machines are not compared (see `Spec.compared`)."""
         return ()
 
 
 def machine_spec(found: RigFileContents) -> MachineSpec:
-    """Fit file of a machine from what was read; raises all its problems together."""
+    """MachineSpec from the parts of a file; raises one error with all its problems."""
     record, settings = found.further.get("record"), found.further.get("fit")
     record = record if isinstance(record, RecordSettings) else RecordSettings()
     options = {} if settings is None else given(settings)
-    only = "says nothing of a machine; allowed: {}"
+    only = "has no meaning for a machine; allowed: {}"
     problems = [Problem(f"record.{name}", only.format(", ".join(READ))) for name in given(record) if name not in READ]
     if "population" in found.further:
         problems.append(Problem("population", "needs fits of sliders; leave it out for a machine"))

@@ -39,7 +39,7 @@ from steadyslip.protocol import Protocol
 TABLES = (
     Section("record", RecordSettings), Section("fit", FitSettings), Section("population", PopulationSettings)
 )  # fmt: skip
-"""Tables of a fit file besides those of a rig file."""
+"""Tables of a fit file in addition to those of a rig file."""
 
 
 @dataclass(frozen=True)
@@ -57,16 +57,17 @@ class Spec(Displayed):
     laws : tuple of str
         Labels of laws to compare; empty unless the file lists some.
     undecided : tuple of str
-        Labels of laws to compare if the normal stress changes in a record and the file names no memory of it: all
-        memories, and unless the file names an evolution law the slip and the aging law with each.
+        Labels of laws to compare if the normal stress changes in a record and the file names no memory of normal
+        stress: all memories, with the slip and the aging law each unless the file names an evolution law.
     windows : bool
-        True if every step of a record is a record of its own.
+        True if every step of a record is fitted as a separate record.
     v_ref_given : bool
-        True if the file gives the velocity at which mu_ref holds; otherwise that at the start of the first record.
+        True if the file gives the velocity at which mu_ref holds; otherwise it is that at the start of the first
+        record.
     contact_given : bool
         True if the file has a table ``[contact]`` with a value.
     population : PopulationSettings or None
-        Settings of a population, if every record is an experiment of its own.
+        Settings of a population, if every record is a separate experiment.
     """
 
     rig: Slider
@@ -81,7 +82,7 @@ class Spec(Displayed):
     population: PopulationSettings | None = None
 
     def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> Record:
-        """Read a record with the settings of the file."""
+        """Record of an experiment, read with the settings of the file."""
         options = self.record.arguments()
         decimate = options.pop("decimate", None)
         options["skip_bad_lines"] = skip_bad_lines or options.get("skip_bad_lines", False)
@@ -89,27 +90,27 @@ class Spec(Displayed):
         return record if decimate is None else record.decimated(decimate)
 
     def fit(self, records: Sequence[Record], **changes: Any) -> Fit:
-        """Fit the records with the settings of the file, but for those given here, as for `steadyslip.fit`."""
+        """Fit to records with the settings of the file; `changes`, as for `steadyslip.fit`, replace some of them."""
         rig, parts = self._rig_and_records(records)
         refuse_unknown("Spec.fit", changes, keywords_of(fit, ["rig", "records"]))
         found: Fit = fit(rig, parts, **(self._options(rig) | {"protocol": self.protocol} | changes))
         return found
 
     def compared(self, records: Sequence[Record]) -> tuple[str, ...]:
-        """Labels of the laws to compare: those of the file, else `undecided` if the normal stress changes."""
+        """Labels of the laws to compare: those of the file, or else `undecided` if the normal stress changes."""
         imposed = self.rig.contact.is_imposed() or self.rig.contact.has_pores()
         decides = imposed and any(record.stress_changes for record in records)
         return self.laws or (self.undecided if decides else ())
 
     def compare(self, records: Sequence[Record], **changes: Any) -> LawComparison:
-        """Fit all laws of `compared`; settings given here, as for `steadyslip.fit`, go before those of the file."""
+        """Comparison of fits of all laws in `compared`; `changes`, as for `steadyslip.fit`, replace settings."""
         refuse_unknown("Spec.compare", changes, keywords_of(fit, ["rig", "records"]))
         rig, parts = self._rig_and_records(records)
         options = self._options(rig) | {"protocol": self.protocol} | changes
         return compare_laws(rig, parts, self.compared(records), **options)
 
     def _options(self, rig: Slider) -> dict[str, Any]:
-        """Arguments of `fit`; the drainage is free too if the rig was given pores because of the records."""
+        """Arguments of `fit`; the drainage rate is free too if the contact got pores because of the records."""
         further = [name for name in rig.of_kind("drainage") if name not in self.rig.parameters()]
         if "free" not in self.options or not further:
             return self.options
@@ -120,7 +121,7 @@ class Spec(Displayed):
         pressed = [record.normal is not None for record in parts]
         if not (self.contact_given or all(pressed)):
             message = (
-                f"{parts[pressed.index(False)].source} has no column for it; name one, or write "
+                f"{parts[pressed.index(False)].source} has no column for it; name a column, or write "
                 "normal_stress = '20 MPa' in [record], or a table [contact]"
             )
             raise ParameterError([Problem("normal", message)])
@@ -130,7 +131,7 @@ class Spec(Displayed):
         return rig, parts
 
     def referred_to(self, record: Record) -> Spec:
-        """Copy with the initial velocity of a record as the reference velocity of mu_ref, unless the file gives one."""
+        """Copy with the initial velocity of a record as reference velocity of mu_ref, unless the file gives that."""
         references = [name for name in self.rig.of_kind("reference rate") if name.startswith("friction.")]
         if self.v_ref_given or not references:
             return self
@@ -144,19 +145,19 @@ def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec | 
     """Read a fit file.
 
     A fit file is a rig file in which fitted values may be missing (a, b, d_c, α, mu_ref, stiffness), and also values
-    that the records give (contact, drive, v_ref). The table ``[record]`` describes the records, ``[fit]`` the fit. That
-    of a machine is complete, and ``[fit] free`` names what is fitted.
+    that the records give (contact, drive, v_ref). The table ``[record]`` describes the records, ``[fit]`` the fit. The
+    fit file of a machine must have all values, and ``[fit] free`` names the fitted parameters.
 
     Parameters
     ----------
     path : path
     changes : iterable of str
-        Values that replace or complete those of the file, as ``"fit.trend=2"``.
+        Values that replace or complete those of the file, such as ``"fit.trend=2"``.
 
     Raises
     ------
     RigFileError
-        Listing everything that is wrong.
+        If the file has faults; lists all of them.
 
     Examples
     --------
@@ -179,7 +180,7 @@ def _spec(found: RigFileContents, filled: _Placeholders) -> Spec:
     missing = filled.missing - found.changed
     left = [] if found.problems or found.rig is None else _values_missing(missing, settings, found.rig)
     if isinstance(record, RecordSettings):
-        left += [Problem(f"record.{name}", "is of a machine's record; leave it out for a slider")
+        left += [Problem(f"record.{name}", "is for records of machines only; leave it out for a slider")
                  for name in ("columns", "averages") if name in given(record)]  # fmt: skip
     members = found.further.get("population")
     members = members if isinstance(members, PopulationSettings) else None
@@ -203,9 +204,9 @@ def _spec(found: RigFileContents, filled: _Placeholders) -> Spec:
 
 
 def _undecided(law: FrictionLaw, said: set[str]) -> tuple[str, ...]:
-    """Labels to compare where the normal stress changes, of a file whose table `[friction]` has the fields `said`.
+    """Labels of laws to compare if the normal stress changes, for a file whose table `[friction]` has the keys `said`.
 
-    What remembers the normal stress cannot be told with the wrong evolution law, which is compared along with it.
+    The memory of normal stress cannot be found with the wrong evolution law; therefore both are compared.
     """
     memories, others = (
         [words for name, words in choices.items() if name not in said]
@@ -225,7 +226,7 @@ def lab_rig(
     v_ref: Any = "1 um/s",
     velocity: Any = None,
 ) -> Slider:
-    """Make a rig for fits, with rate-and-state friction and constant normal stress; its values are placeholders.
+    """Rig for fits, with rate-and-state friction and constant normal stress; its values are placeholders.
 
     Parameters
     ----------
@@ -235,15 +236,15 @@ def lab_rig(
     normal_memory : str
         ``none``, ``linker-dieterich`` or ``prakash-clifton``.
     pores : bool
-        Whether the contact has pores into which a changed pore pressure drains, at a rate that is fitted; if not, it
-        acts at once.
+        True for a contact with pores: a change of the pore pressure drains into them at a rate that is fitted. If
+        false, it acts at once.
     stiffness : float or str, optional
-        Of the machine, Pa/m, where it is known; name it in ``fixed`` of `fit`.
+        Stiffness of the machine, Pa/m, if it is known; name it also in ``fixed`` of `fit`.
     v_ref : float or str
-        Rate at which mu_ref holds.
+        Reference velocity, at which friction is mu_ref.
     velocity : float or str, optional
-        Rate of the load point before the first change of a protocol; by default that of the records. `fit` asks for it
-        where these have no displacement.
+        Velocity of the load point before the first change of a protocol; by default that of the records. `fit` needs
+        it if the records have no displacement.
 
     Examples
     --------
@@ -263,14 +264,26 @@ def lab_rig(
 
 
 def with_pores(rig: Slider) -> Slider:
-    """Rig with pores in its contact that drain, without dilatancy; the drainage rate is a placeholder."""
+    """Rig with draining pores in its contact, without dilatancy; the drainage rate is a placeholder."""
     return replace(rig, contact=contact_laws.porous(steady_state(rig).normal_stress))
 
 
 class _Placeholders:
-    """Fills in missing values of a fit file, and keeps which of them are to be fitted or to be read off records.
+    """Completes the tables of a fit file with placeholders, and records which values were missing.
 
     The laws declare which values may be missing, with their placeholders (`Parameter.standing`).
+
+    Attributes
+    ----------
+    problems : list of Problem
+    missing : set of str
+        Names of missing parameters that are to be fitted.
+    standing : dict of str to str
+        Names of missing parameters that follow from the records, by kind (`FROM_RECORDS`).
+    friction : set of str
+        Keys that the file has in its table ``[friction]``.
+    of_machine : bool
+        True if the file describes a machine.
     """
 
     FROM_RECORDS = ("reference rate", "normal stress")
@@ -283,11 +296,11 @@ class _Placeholders:
         self.of_machine = False
 
     def given(self, kind: str, changed: set[str]) -> bool:
-        """True if the file, or a change to it, gives a value that would otherwise come from the records."""
+        """True if the file, or a change to it, gives the parameter of a kind that else comes from the records."""
         return kind not in self.standing or self.standing[kind] in changed
 
     def complete(self, tables: Table) -> None:
-        """Fill the tables of a slider; a machine's are complete."""
+        """Add placeholders to the tables of a slider; those of a machine must be complete."""
         self.of_machine = any(name in tables for name in ("bodies", "links", "contacts"))
         if self.of_machine:
             return
@@ -317,7 +330,7 @@ class _Placeholders:
                     self._fill(contact, item, "contact.")
 
     def _fill(self, table: Table, item: Field[Any], prefix: str, factor: float = 1.0) -> None:
-        """Fill in the placeholder of a missing parameter, times `factor`, if it declares one."""
+        """Add the placeholder of a missing parameter, times `factor`, to its table, if it declares one."""
         role = role_of(item)
         if item.name in table or not isinstance(role, Parameter) or role.standing is None:
             return
@@ -328,7 +341,7 @@ class _Placeholders:
             self.missing.add(f"{prefix}{item.name}")
 
     def _fill_law(self, table: Table, law: type[FrozenRecord], prefix: str, states: Any = None) -> None:
-        """Fill in the parameters of a law and of its parts; those of a list of states in the list, not in the law."""
+        """Add placeholders for the parameters of a law, of its parts, and of the states in a list."""
         items = {item.name: item for item in fields(law)}  # type: ignore[arg-type]  # every law is a dataclass
         roles = {name: role for name, item in items.items() if isinstance(role := role_of(item), Part)}
         lists = [name for name, role in roles.items() if role.many]
@@ -345,13 +358,13 @@ class _Placeholders:
                 self._fill_part(table, name, role, prefix, elsewhere)
 
     def _fill_members(self, table: Table, name: str, family: type[FrozenRecord], prefix: str, states: Any) -> set[str]:
-        """Fill in the members of a list, and return the names that the law itself then does not need."""
+        """Add placeholders to the members of a list; return the names of parameters not needed in the law itself."""
         items = [item for item in fields(family) if getattr(role_of(item), "standing", None) is not None]  # type: ignore[arg-type]
         single = {item.name for item in items} & set(table)
         if name not in table and isinstance(states, int) and 1 < states <= MOST_STATES:
             if single:
                 words = " or ".join(item.name for item in items)
-                self.problems.append(Problem("fit.states", f"friction has {words} of a single state; leave them away"))
+                self.problems.append(Problem("fit.states", f"friction has {words} of a single state; leave them out"))
                 return {item.name for item in items}
             table[name] = [{} for _ in range(states)]
         members = table.get(name)
@@ -364,7 +377,7 @@ class _Placeholders:
         return {item.name for item in items} | {key for member in members for key in member}
 
     def _fill_part(self, table: Table, name: str, role: Part, prefix: str, elsewhere: set[str]) -> None:
-        """Fill in the parameters of a part of a law, in the law's table or in a table of the part."""
+        """Add placeholders for the parameters of a part of a law, in the law's table or in that of the part."""
         chosen = table.get(name)
         own = chosen.get("law") if isinstance(chosen, dict) else chosen
         law = role.family.registry.get(own) if isinstance(own, str) else None
@@ -386,7 +399,7 @@ def _kind(item: Field[Any]) -> str:
 
 
 def _values_missing(missing: set[str], settings: FitSettings, rig: Slider | Machine) -> list[Problem]:
-    """Problems with parameters that have no value and are not fitted, whose placeholders must not be used."""
+    """Problems with parameters that have no value and are not fitted: their placeholders must not be used."""
 
     problems: list[Problem] = []
 

@@ -205,7 +205,7 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path, clean):
     message = faults(missing)
     assert "no column for friction" in message
     assert "'Displ(um)'" in message
-    assert "is in MPa by its name, but kPa is asked for" in faults(path, normal="kPa")
+    assert "is in MPa by its name, but the option says kPa" in faults(path, normal="kPa")
     assert "is in um; expected a quantity in s" in faults(path, time="Displ(um)")
     assert "unknown column 'Frictoin'; did you mean 'Friction'?" in faults(path, friction="Frictoin")
     assert "unknown column role" in faults(path, frction="Friction")

@@ -1,4 +1,4 @@
-"""Fits of machines: a machine's motions, forces and frequency responses in place of a slider's friction.
+"""Fits of machines to records of their motions, forces and frequency responses.
 
-What the search needs is that of any fit (comparison, least squares, errors); knows nothing of commanded loading.
+The comparison, the least-squares search and the errors are those of all fits; there is no commanded loading.
 """

@@ -1,4 +1,4 @@
-"""Fit a machine to records: search, weights of the columns by their own scatter, errors."""
+"""Fit of a machine to records: search, weights of the columns from the scatter of their residuals, errors."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, minimise
 from steadyslip.machine.machine import Machine
 
-MAX_WEIGHINGS = 8  # times that the scatter of the columns is estimated anew at most; three usually suffice
-ALIKE = 0.02  # relative change of a scatter that makes no difference to the estimates
+MAX_WEIGHINGS = 8  # most estimates of the columns' scatter; three usually suffice
+ALIKE = 0.02  # a smaller relative change of the scatter makes no difference to the estimates
 
 
 def fit_machine(
     machine: Machine, records: Any, free: Sequence[str] | None = None, *, errors: str = "auto", starts: int = STARTS,
     effort: float = 1.0, threads: int | None = None, progress: Progress | None = None, **options: Any,
 ) -> MachineFit:  # fmt: skip
-    """Fit a machine to its records; see `steadyslip.fit`.
+    """Fit of a machine to records; see `steadyslip.fit`.
 
-    Columns are of different kinds, so the noise of each is estimated from its own residuals, and weighs it.
+    Columns hold different quantities; each is weighted by its noise, which is estimated from its residuals.
     """
     plan = make_machine_plan(machine, records, free, errors=errors, starts=starts, effort=effort, **options)
     space = plan.space()
@@ -57,7 +57,7 @@ def fit_machine(
 
 
 def _scatter(plan: MachinePlan, comparison: MachineComparison, z: Array) -> tuple[float, ...]:
-    """Standard deviation of each series about the model, at least what the integration leaves."""
+    """Standard deviation of each series about the model, in SI units; at least the error of the integration."""
     r = (comparison.data - comparison.model(z[None])[0][0]) * comparison.weights
     before = plan.scatter or tuple(one.size for one in plan.series)
     return tuple(

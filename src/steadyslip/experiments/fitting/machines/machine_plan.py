@@ -1,4 +1,4 @@
-"""Plan of a fit of a machine: rig, records, free parameters, and the comparison of both."""
+"""Plan of a fit of a machine: rig, records and free parameters; and the comparison of the rig with the records."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from steadyslip.motion.targets import targets
 from steadyslip.protocol import Protocol
 
 STEP = 1e-4
-"""Step of the differences that are the derivatives, in coordinates: e-folds or natural sizes. The integration errs by
-1e-9 of a motion's size, which makes 1e-5 of a derivative; a ring-down of 50 periods bends by as much."""
-ROUGH_STEP = 1e-3  # the same of one-sided differences of motions that are integrated roughly
-TIME_SPAN = 10.0  # hundredths of the record within which a time of the protocol is searched
-SPAN = 1e4  # factor on both sides of the machine's own value within which a parameter is searched
+"""Step of finite differences in coordinates (e-folds or natural sizes). An integration error of 1e-9 of the motion
+causes an error of 1e-5 in a derivative; for a ring-down of 50 periods, the truncation error is as large."""
+ROUGH_STEP = 1e-3  # step of one-sided differences of motions that are integrated with a large tolerance
+TIME_SPAN = 10.0  # range of the search for a time of the protocol, in hundredths of the record
+SPAN = 1e4  # range of the search for a parameter: this factor on both sides of the machine's value
 
 Model = Callable[[Mapping[str, Array], Mapping[str, Array], int], Array]
 
@@ -46,18 +46,18 @@ class MachinePlan:
     free : tuple of str
         Full names of the free parameters of the rig, and of the protocol (``protocol.pieces.1.at``).
     separate : tuple of str
-        Free parameters that have a value of their own in every record.
+        Free parameters that have a separate value in every record.
     protocol : Protocol or None
     trend : int
         Order of a polynomial in time that is added to every column.
     offset : bool
         True to add a constant to every column.
     initial : str
-        ``steady``, or ``free`` if places and velocities at the beginning are fitted.
+        ``steady``, or ``free`` if initial displacements and velocities are fitted.
     scatter : tuple of float
         Standard deviation of the noise of each series, SI units, by which its residuals are divided.
     rtol : float
-        Relative error allowed per step of a motion.
+        Relative tolerance of a step in simulations.
     """
 
     rig: Machine
@@ -75,7 +75,7 @@ class MachinePlan:
 
     @cached_property
     def units(self) -> dict[str, str]:
-        """SI units of what runs of the machine have, by name."""
+        """SI units of the quantities that a simulated run of the machine contains, by name."""
         return observable_units(self._point.model, targets(self.rig, self.protocol or Protocol()))
 
     @cached_property
@@ -87,7 +87,7 @@ class MachinePlan:
         return tuple(one for i, record in enumerate(self.records) for one in series_of(i, record, self.units))
 
     def known(self) -> dict[str, Address]:
-        """Parameters that may be free, by dotted name: those that have a value and an effect of their own."""
+        """Parameters that may be free, by dotted name: those with a value, and with an effect on the motion."""
         found = dict(self.rig.parameters())
         if self.protocol is not None:
             found |= parameters(self.protocol, "protocol.")
@@ -102,7 +102,7 @@ class MachinePlan:
         }
 
     def space(self) -> Space:
-        """Unknowns in order: free parameters, then starts, offsets and trends of each record."""
+        """Unknowns of the fit: free parameters, then initial states, offsets and trends of each record."""
         several, known = len(self.records) > 1, self.known()
         found: list[Unknown] = []
         for name in self.free:
@@ -117,7 +117,7 @@ class MachinePlan:
         return Space(tuple(found))
 
     def _of_record(self, i: int, record: MotionRecord, label: str) -> list[Unknown]:
-        """Unknowns of one record alone."""
+        """Unknowns of record `i` alone: initial states, offsets and trends; `label` follows their names."""
         found = []
         several = i if label else None
 
@@ -137,7 +137,7 @@ class MachinePlan:
 
     @cached_property
     def _starts(self) -> dict[str, tuple[float, float]]:
-        """Places and velocities in which a motion may begin: natural size, and value in steady sliding."""
+        """Natural size, and value in steady sliding, of each displacement and velocity with a free initial value."""
         model = self._point.model
         scales, _ = natural_scales(self._point, reduce_model(model, None))
         items = [item for item in model.variables if item.kind in ("slip", "velocity")]
@@ -164,7 +164,7 @@ class MachinePlan:
         return np.asarray(space.coordinates(np.array(values)))
 
     def ends(self, space: Space) -> tuple[Array, Array]:
-        """Lower and upper bounds (p,) of the search, in coordinates: the domain's, and `SPAN` from the own values."""
+        """Lower and upper bounds (p,) of the search in coordinates: by the domain, and by `SPAN` and `TIME_SPAN`."""
         times = [one.parameter.startswith("protocol.") and one.unit == "s" for one in space.unknowns]
         reach = np.array([np.log(SPAN) if one.logarithmic else SPAN for one in space.unknowns])
         reach[times] = TIME_SPAN
@@ -184,13 +184,13 @@ class MachinePlan:
 
 
 class MachineComparison(DataComparison):
-    """All series of the records with the machine's model of them; derivatives are differences.
+    """Comparison of all series of the records with their models; derivatives are finite differences.
 
     Parameters
     ----------
     plan : MachinePlan
     models : list of callable
-        Of each record.
+        Model of each record.
     rough : bool
         True for one-sided differences.
     """
@@ -203,7 +203,7 @@ class MachineComparison(DataComparison):
         self.low, self.high = plan.ends(self.space)
 
     def values(self, coordinates: Array) -> Array:
-        """What the records have, of the machine (m, n), at coordinates (m, p)."""
+        """Predicted values (m, n) of all series at coordinates (m, p)."""
         values, jobs = self.space.values(coordinates), len(coordinates)
         found = []
         for i, model in enumerate(self.models):
@@ -215,7 +215,7 @@ class MachineComparison(DataComparison):
         return np.concatenate(found, axis=1)
 
     def _added(self, record: int, own: Mapping[str, Array], jobs: int) -> Array:
-        """Offsets and trends of one record, (jobs, n)."""
+        """Sum (jobs, n) of the offsets and trends of one record."""
         parts = []
         for one in self.series:
             if one.record == record:
@@ -256,9 +256,9 @@ class MachineComparison(DataComparison):
 
 
 def _smooth_slopes(forward: Array, backward: Array) -> Array:
-    """Means of one-sided slopes (m, p, n), or the less steep one where they are unlike.
+    """Means of one-sided derivatives (m, p, n), or the smaller one if they differ much.
 
-    A motion that begins to stick, or ends, just beside a point says nothing of the slope there.
+    If a motion begins to stick, or ends, on one side of a point, the difference on that side is no derivative.
     """
     sizes = [np.linalg.norm(one, axis=2) for one in (forward, backward)]
     sizes = [np.where(np.isfinite(one), one, np.inf) for one in sizes]

@@ -1,4 +1,4 @@
-"""Make the plan of a fit of a machine from the arguments of a user; one error lists everything that is wrong."""
+"""Plan of a fit of a machine from the user's arguments; one error lists everything that is wrong with them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.protocol import Protocol
 
 OF_SLIDERS = ("drive", "trend_axis", "lag", "loss", "width", "calibrated", "states", "compare", "windows", "weights")
-"""Options of fits of sliders that a machine's does not have."""
+"""Options of fits of sliders that fits of machines do not have."""
 
 
 def make_machine_plan(
@@ -27,20 +27,20 @@ def make_machine_plan(
     separate: Sequence[str] = (), protocol: Any = None, trend: int = 0, offset: bool = False, initial: str = "steady",
     **others: Any,
 ) -> MachinePlan:  # fmt: skip
-    """Make a plan from the arguments of `steadyslip.fit`.
+    """Plan from the arguments of `steadyslip.fit`.
 
     Raises
     ------
     ParameterError
-        Listing everything that is wrong.
+        If arguments are wrong; lists all faults.
     NotAvailable
-        If the machine is of a kind that is not fitted.
+        If the machine has a structure or holds a place: such machines cannot be fitted.
     """
     many = tuple(records) if isinstance(records, (list, tuple)) else (records,)
     if not many or not all(isinstance(record, (MotionRecord, ResponseData)) for record in many):
         message = (
-            f"got {records!r:.80}; allowed for a machine: what experiments.read_motion or read_frequency_response "
-            "gives, or several"
+            f"got {records!r:.80}; allowed for a machine: a record from experiments.read_motion or "
+            "experiments.read_frequency_response, or several"
         )
         raise ParameterError([Problem("records", message)])
     if any(body.is_structure for body in machine.bodies.values()) or machine.holds:
@@ -50,7 +50,7 @@ def make_machine_plan(
     problems = list(faults({name: value for name, value in chosen.items() if name != "weights"}))
     usual = FitSettings()
     problems += [
-        Problem(name, "has no effect on a machine, whose record is followed as it is; leave it out")
+        Problem(name, "has no effect on a fit of a machine; leave it out")
         for name in OF_SLIDERS
         if name in others and others[name] != getattr(usual, name, None)
     ]
@@ -67,7 +67,7 @@ def make_machine_plan(
             Problem("free", f"nothing is free; name parameters such as {', '.join((shown or list(known))[:3])}")
         )
     problems += [
-        Problem(name, "is 0 in the machine; give it a value above, from which the search starts")
+        Problem(name, "is 0 in the machine; give it a value above 0, from which the search starts")
         for name in names
         if not known[name].value and known[name].role.domain.low == 0 and known[name].role.size is None
     ]
@@ -95,8 +95,9 @@ def _of_motion(plan: MachinePlan, record: MotionRecord, where: str) -> list[Prob
             found.append(Problem(f"{where}, {name}", f"is in {written}; expected a unit such as {plan.units[name]}"))
     if plan.initial == "steady" and not (plan.protocol is not None and plan.protocol.pieces):
         message = (
-            "nothing disturbs the machine, and steady sliding that nothing disturbs tells little; allowed: a protocol "
-            "(a push, a step of the drive), or initial = 'free' for a motion that begins away from steady sliding"
+            "nothing disturbs the machine, and undisturbed steady sliding determines no parameters; allowed: a "
+            "protocol (a push, a step of the drive), or initial = 'free' for a motion that begins away from steady "
+            "sliding"
         )
         found.append(Problem("protocol", message))
     if plan.protocol is not None and record.time[0] < 0:
@@ -106,7 +107,7 @@ def _of_motion(plan: MachinePlan, record: MotionRecord, where: str) -> list[Prob
 
 
 def _of_response(plan: MachinePlan, record: ResponseData, where: str) -> list[Problem]:
-    """Problems with the ends of frequency responses."""
+    """Problems with a frequency response: names of its ends, gaps, and a frequency of 0."""
     known = [name for name in plan.units if name.endswith(".x")]
     ends = [name.removesuffix(".x").replace(".normal", ".y") for name in known]
     ends = [end if end.endswith(".y") else f"{end}.x" for end in ends]
@@ -118,5 +119,5 @@ def _of_response(plan: MachinePlan, record: ResponseData, where: str) -> list[Pr
     if not found and not pairs_of(record):
         found.append(Problem(where, f"{record.source} has no response without gaps"))
     if record.omega[0] <= 0:
-        found.append(Problem(where, "its first frequency is 0, where a machine that slides gives way; leave it out"))
+        found.append(Problem(where, "its first frequency is 0, where a sliding machine has no stiffness; leave it out"))
     return found

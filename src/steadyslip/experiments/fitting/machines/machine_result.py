@@ -29,7 +29,7 @@ class MachineFit(Fitted):
     Attributes
     ----------
     plan : MachinePlan
-        Machine, records and options of the fit; all else is as of a `Fit`.
+        Machine, records and options of the fit. The other attributes are those of a `Fit`.
     """
 
     plan: MachinePlan
@@ -48,7 +48,7 @@ class MachineFit(Fitted):
 
     @property
     def scatter(self) -> dict[str, float]:
-        """Root mean square of the residuals of each column, SI units; of several records with ``@2`` behind it."""
+        """Root mean square of the residuals by name of the series, SI units; ``@2`` marks the second record."""
         several = len(self.plan.records) > 1
         return {
             f"{one.name}@{one.record + 1}" if several else one.name: float(np.sqrt(np.mean(self.residuals[where] ** 2)))
@@ -56,7 +56,7 @@ class MachineFit(Fitted):
         }
 
     def rig(self, record: int = 0) -> Machine:
-        """The machine with the fitted values, those of a record where they differ."""
+        """Machine with the fitted values; those of `record` if values differ between records."""
         known = self.plan.rig.parameters()
         return self.plan.rig.with_values({
             one.parameter: self.values[one.name]
@@ -65,15 +65,15 @@ class MachineFit(Fitted):
         })  # fmt: skip
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units, as ``--json`` prints it; numbers that do not exist are None."""
+        """Convert to a dict of JSON-ready data in SI units, as printed by ``--json``; None for missing numbers."""
         return fitted_dict(self) | {"scatter": self.scatter, "warnings": _warnings(self)}
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write everything, the records included, to a netCDF file; `load_fit` reads it back."""
+        """Write the fit and its records to a netCDF file; `load_fit` reads it back."""
         machine_store.save(self, path)
 
     def plot(self, kind: str = "fit", ax: Any = None) -> Any:
-        """Draw the fit: every column with the machine's, and the residuals.
+        """Plot the fit: every measured column with the prediction of the machine, and the residuals.
 
         Returns
         -------
@@ -106,7 +106,7 @@ def _warnings(fit: MachineFit) -> list[str]:
     seen = any(rms > np.sqrt(EXACT) * one.size for rms, one in zip(fit.scatter.values(), fit.plan.series, strict=True))
     if seen and fit.whiteness.p < STRUCTURE:
         found.append(
-            f"residuals have structure (whiteness {chance(fit.whiteness.p)}): the machine does something that this one "
-            "does not; look at them (plot), and free a damping, an offset, a trend, or the beginning"
+            f"residuals have structure (whiteness {chance(fit.whiteness.p)}): the real machine does something that "
+            "this model does not; plot the residuals, and free a damping, an offset, a trend, or the initial state"
         )
     return found

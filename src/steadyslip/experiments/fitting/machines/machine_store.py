@@ -1,4 +1,4 @@
-"""Fits of machines in netCDF files, with their records; reading a file executes nothing in it."""
+"""Storage of fits of machines, with their records, in netCDF files; reading a file executes nothing in it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ F = TypeVar("F", bound=Fitted)
 
 
 def save(fit: Fitted, path: str | PathLike[str]) -> None:
-    """Write a fit to a file; an existing file is replaced only when the new one is complete.
+    """Write a fit of a machine to a file; an existing file is replaced only when the new one is complete.
 
     Raises
     ------
@@ -76,14 +76,14 @@ def save(fit: Fitted, path: str | PathLike[str]) -> None:
 
 
 def read(path: str | PathLike[str], made: type[F]) -> F:
-    """Read a fit that `save` wrote, as an instance of the class `made`.
+    """Fit of a machine that `save` wrote, as an instance of the class `made`.
 
     Nothing in the file is executed; a damaged file is refused.
 
     Raises
     ------
     NotAvailable
-        If the file is not one of ours, is damaged, or cannot be read.
+        If the file was not written by `save`, is damaged, or cannot be read.
     """
     table = ExpectedTable(path, MACHINE_FIT, RESULT_ATTRIBUTES | dict.fromkeys(("rig", "options", "records"), str))
     stored = {name: table.json(table.attributes[name], form) for name, form in _FORMS.items()}
@@ -104,7 +104,7 @@ def read(path: str | PathLike[str], made: type[F]) -> F:
     except ParameterError as error:
         raise table.fault(str(error)) from error
     if [f"sample_{one.record + 1}" for one in plan.series] != places:
-        raise table.fault(f"its records have {len(plan.series)} series, and {len(places)} are told")
+        raise table.fault(f"its records have {len(plan.series)} series, but it lists {len(places)}")
     return result_of(table, found, stored, made, plan)
 
 
@@ -120,7 +120,7 @@ def _record(
 
 
 def _plan(table: ExpectedTable, records: list[Any], options: dict[str, Any]) -> MachinePlan:
-    """Plan made from the options of the file, with the checks of user input."""
+    """Plan from the options of the file, which are checked like user input."""
     from steadyslip.files.specifications import protocol_from_text, rig_from_text
 
     text, source = table.attributes["rig"], str(table.path)

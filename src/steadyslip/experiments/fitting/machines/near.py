@@ -1,8 +1,9 @@
-"""Search for the least sum of squares of a fit of a machine, from the machine's own values and around them.
+"""Search for the least sum of squares in a fit of a machine, starting at the machine's parameters and around them.
 
-Phases of a long ring-down, or narrow peaks of a response, tell little of a frequency that is off by more than a period
-or a width. So each start first follows a short beginning of the motions, then a longer one, and the logarithm of
-responses; it is held back softly, so that what a beginning does not tell stays where it is.
+The sum of squares has many local minima: a model frequency that is off by more than one period over a ring-down, or by
+more than the width of a peak, is not corrected. Therefore each start is first fitted to a short beginning of the
+motions, then to a longer one, and to the logarithm of responses. A weak penalty on the distance from the start keeps
+parameters that a beginning does not determine.
 """
 
 from __future__ import annotations
@@ -28,25 +29,27 @@ from steadyslip.experiments.measured.motion_record import MotionRecord
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, MERGE_DISTANCE, SAME_SSQ, Minima, minimise
 
 BEGINNINGS = (1 / 16, 1 / 4)
-"""Parts of a record that are followed one after the other: a frequency told by one is good for four times its length.
-Ring-downs of 60 and 120 periods took 1.3 to 6 times as long without."""
-FEWEST_FOLLOWED = 10  # samples of a part, and twice as many as unknowns
-MOST_ITERATIONS = 100  # on whole records; those that take more follow a valley that the record leaves open
-ROUGH_RTOL = 1e-6  # of motions in these
-ROUGH_HOPE = 100.0  # ends above this multiple of the best sum of squares of a beginning are dropped
-HELD_BACK = 1e-4  # mean square of residuals, in sizes of their series, that an e-fold away from a start costs there
-ELSEWHERE, RISE = 0.1, 2.0  # e-folds or sizes apart, and multiple of the sum of squares between, of different minima
-SPREAD = 1.15  # largest distance of a start from the machine's own values, e-folds: a factor of three
+"""Shares of a record that are fitted first: a frequency found in one is precise enough for four times its length.
+Without them, fits to ring-downs of 60 and 120 periods took 1.3 to 6 times as long."""
+FEWEST_FOLLOWED = 10  # least number of samples of such a part
+MOST_ITERATIONS = 100  # most iterations on whole records; longer searches are in a valley that the record leaves open
+ROUGH_RTOL = 1e-6  # relative tolerance of motions in the first parts
+ROUGH_HOPE = 100.0  # fits to a first part are dropped above this multiple of the best sum of squares
+HELD_BACK = 1e-4  # penalty for an e-fold from the start: this mean square of residuals over the size of their series
+ELSEWHERE, RISE = 0.1, 2.0
+"""Two minima differ if they are farther apart than this (e-folds or natural sizes) and the sum of squares halfway
+between them is at least this multiple of theirs."""
+SPREAD = 1.15  # largest distance of a start from the machine's parameters, e-folds: a factor of three
 
 
 class FirstPart:
-    """First part of all motions of a plan, and the logarithm of its responses.
+    """Residuals of the first part of all motions of a plan, and of the logarithm of its responses.
 
     Parameters
     ----------
     plan : MachinePlan
     share : float
-        Of each record, from where it is first disturbed.
+        Length of the part as a share of each record, from its first disturbance on.
     effort : Effort
     """
 
@@ -69,7 +72,7 @@ class FirstPart:
         return self.comparison.size
 
     def residuals(self, coordinates: Array, starts: Array) -> tuple[Array, Array]:
-        """Residuals (m, n) and derivatives of the model, with one more for each coordinate that holds it back."""
+        """Residuals (m, n) and derivatives (m, p, n), including the p penalties on the distance from the starts."""
         predicted, slopes = self.comparison.model(coordinates)
         r, rows = self.comparison.data - predicted, np.array(slopes)
         for k, (one, where) in enumerate(zip(self.comparison.series, self.comparison.slices, strict=True)):
@@ -86,7 +89,7 @@ class FirstPart:
 
 
 def _of_logarithms(data: Array, predicted: Array, slopes: Array) -> tuple[Array, Array]:
-    """Differences of the logarithms of complex data and model, real parts before imaginary ones; and derivatives."""
+    """Residuals and derivatives of the logarithms of complex responses; real parts come before imaginary parts."""
     half = len(data) // 2
 
     def whole(parts: Array) -> Array:
@@ -98,7 +101,7 @@ def _of_logarithms(data: Array, predicted: Array, slopes: Array) -> tuple[Array,
 
 
 def _disturbed(plan: MachinePlan, record: MotionRecord) -> float:
-    """Time (s) at which a motion is first disturbed."""
+    """Time (s) of the first disturbance of a motion; the first sample if the protocol has none."""
     times = [float(getattr(piece, "at", 0.0) or 0.0) for piece in (plan.protocol.pieces if plan.protocol else ())]
     first = float(record.time[0])
     return first if plan.initial == "free" or not times else float(np.clip(min(times), first, record.time[-1]))
@@ -115,7 +118,8 @@ def find_near(
 ) -> tuple[Array, SearchSummary, MachineComparison]:
     """Best-fit coordinates (p,), the summary of the search, and the comparison with the records.
 
-    The first start is the machine itself. More follow, up to `starts`, until `MIN_ARRIVED` end at the best minimum.
+    The first start has the machine's parameters. More follow, up to `starts`, until `MIN_ARRIVED` of them have reached
+    the best minimum.
 
     Raises
     ------
@@ -125,7 +129,7 @@ def find_near(
     whole = plan.comparison(effort)
     for model in whole.models:
         if isinstance(model, MotionModel):
-            model.run({}, {}, 1)  # raises, and says why, if the machine itself cannot move
+            model.run({}, {}, 1)  # raises an error with the reason if the machine cannot move
     stop = effort.budget.part(work_of_search(whole.size, len(whole.space)) * effort.budget.scale)
     motions = any(isinstance(record, MotionRecord) for record in plan.records)
     parts = [FirstPart(plan, share, effort) for share in (BEGINNINGS if motions else BEGINNINGS[:1])]
@@ -144,7 +148,7 @@ def find_near(
             )  # fmt: skip
             here, which = _hopeful(ends)
             counts = np.array([np.sum(counts[which == k]) for k in range(len(here))], dtype=int)
-        if not tried:  # the machine itself may be near, and beginnings mislead where a time is free
+        if not tried:  # the machine's parameters may be near, and first parts mislead if a time is free
             here, counts = np.concatenate([here, begin[:1]]), np.append(counts, 1)
         tried = upto
         ends = minimise(
@@ -160,7 +164,7 @@ def find_near(
             break
     if not np.any(np.isfinite(found.ssq)):
         raise NotAvailable(
-            "the machine cannot move as these records do from any start: are its values, protocol and beginning "
+            "the machine cannot move as in these records from any start: are its values, protocol and initial state "
             "(initial) those of the test?"
         )
     found = found.sorted()
@@ -174,16 +178,17 @@ def find_near(
 
 
 def _is_another(whole: MachineComparison, found: Minima, most: float) -> bool:
-    """True if a minimum as good as the first lies elsewhere, beyond a rise: two machines that move alike there."""
+    """True if another minimum is as good as the first and separated from it by a rise of the sum of squares."""
     alike = found.coordinates[found.converged & (found.ssq <= most)]
     far = alike[np.max(np.abs(alike - found.coordinates[0]), axis=1, initial=0.0) > ELSEWHERE]
     return bool(len(far)) and bool(np.any(whole.misfit(0.5 * (far + found.coordinates[0])) > RISE * most))
 
 
 def _hopeful(ends: Minima) -> tuple[Array, Array]:
-    """Different ends that may lead to the best minimum (k, p), and to which of them each end (m,) belongs; -1 to none.
+    """Distinct end points (k, p) that may lead to the best minimum, and index (m,) of the one that each end is near.
 
-    Of no rounds that could be computed all go on: a longer part may be another matter.
+    The index is -1 for ends that are dropped. If no sum of squares could be computed, all ends are kept, as a longer
+    part may be computable.
     """
     if not np.any(np.isfinite(ends.ssq)):
         return ends.coordinates, np.arange(len(ends.ssq))
@@ -194,7 +199,7 @@ def _hopeful(ends: Minima) -> tuple[Array, Array]:
 
 
 def _starts(plan: MachinePlan, whole: MachineComparison, count: int) -> Array:
-    """Starting coordinates (count, p): the machine's own values, then others around them by a Halton sequence."""
+    """Starting coordinates (count, p): the machine's parameters, then points around them in a Halton sequence."""
     from scipy.stats import qmc
 
     own = plan.begins(whole.space)
@@ -203,5 +208,5 @@ def _starts(plan: MachinePlan, whole: MachineComparison, count: int) -> Array:
     grid = qmc.Halton(len(own), rng=12345).random(count)
     grid[0] = 0.5
     found = own + (2 * grid - 1) * spread
-    found[1::2] += plan.begins(whole.space, steadily=True) - own  # no motion may begin at a first sample with its noise
+    found[1::2] += plan.begins(whole.space, steadily=True) - own  # a noisy first sample may allow no motion
     return np.asarray(np.clip(found, whole.low, whole.high))

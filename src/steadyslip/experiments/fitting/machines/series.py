@@ -1,4 +1,4 @@
-"""Series of numbers that records have of a machine, and the model of each: columns over time, or over frequency."""
+"""Measured series of a machine, over time or over frequency, and the models that predict them."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ from steadyslip.motion import simulate_many
 from steadyslip.protocol import Protocol
 
 PUSH = ".push"
-EXACT = 1e-12  # mean square of residuals, in sizes of their series, that is left by the integration alone
+EXACT = 1e-12  # mean square of residuals over the size of their series that is due to integration errors alone
 STEPS_PER_SAMPLE, FEWEST_STEPS = 200, 20_000
-"""Steps after which a motion is given up: stick-slip between two samples takes some tens."""
+"""A simulation is stopped after these steps per sample, plus a fixed number: stick-slip between two samples takes some
+tens of steps."""
 
 
 @dataclass(frozen=True, eq=False)
 class MachineSeries(ReadOnly):
-    """A column of a record, whose noise is its own.
+    """Measured series with independent noise: a column of a record, or a part of a frequency response.
 
     Attributes
     ----------
@@ -42,7 +43,7 @@ class MachineSeries(ReadOnly):
         Times (s) or angular frequencies (rad/s).
     data : ndarray (n,)
     weights : ndarray (n,)
-        One over the standard deviation of each sample, up to a factor.
+        Reciprocal of the standard deviation of each sample, up to a common factor.
     """
 
     record: int
@@ -54,17 +55,17 @@ class MachineSeries(ReadOnly):
 
     @property
     def size(self) -> float:
-        """Size of its changes: by it, residuals are told at first."""
+        """Scale of the residuals before their scatter is known: standard deviation of the data, or largest value."""
         return float(np.std(self.data)) or float(np.max(np.abs(self.data))) or 1.0
 
 
 def coordinate_of(end: str) -> str:
-    """Name of a coordinate of the Model for a point with direction of a frequency response."""
+    """Name of the model's coordinate for an end of a frequency response, such as ``table.x`` or ``table.y``."""
     return f"{end.removesuffix('.y')}{NORMAL}" if end.endswith(".y") else end.removesuffix(".x")
 
 
 def pairs_of(data: ResponseData) -> list[tuple[int, int]]:
-    """Indices of response and force of every receptance that was measured at all frequencies."""
+    """Pairs of indices (response, force) of the receptances that were measured at all frequencies."""
     count = range(len(data.names))
     return [(i, j) for i in count for j in count if np.all(np.isfinite(data.receptance[:, i, j]))]
 
@@ -88,13 +89,13 @@ def series_of(index: int, record: MotionRecord | ResponseData, units: Mapping[st
 
 
 class MotionModel:
-    """Columns of a record as the machine has them.
+    """Model of the columns of a record, from a simulation of the machine.
 
     Parameters
     ----------
     rig : Machine
     protocol : Protocol or None
-        On the record's clock; without one the motion begins at the first sample.
+        Its times are those of the record; without a protocol the motion begins at the first sample.
     record : MotionRecord
     rtol : float
     effort : Effort
@@ -108,7 +109,7 @@ class MotionModel:
         self.most = FEWEST_STEPS + STEPS_PER_SAMPLE * len(record)
 
     def run(self, values: Mapping[str, Array], begin: Mapping[str, Array], jobs: int) -> Array:
-        """Columns one after the other, (jobs, n); see `simulate_many` for what it raises."""
+        """Predicted columns (jobs, n), one after the other; raises the errors of `simulate_many`."""
         varied = dict(values) or {"drive.velocity": np.full(jobs, self.rig.drive.velocity)}
         found = simulate_many(
             self.rig, varied, self.protocol, until=float(self.times[-1]), times=self.times, initial=begin,
@@ -116,12 +117,12 @@ class MotionModel:
             progress=False,
         )  # fmt: skip
         if np.any(found.status == "interrupted"):
-            raise KeyboardInterrupt  # the runs that are missing must not count as failed ones
+            raise KeyboardInterrupt  # missing runs must not count as failed
         self.effort.budget.spend((found.steps + found.rejected).astype(float), 1)
         return np.concatenate([found.samples[name] for name in self.names], axis=1)
 
     def __call__(self, values: Mapping[str, Array], begin: Mapping[str, Array], jobs: int) -> Array:
-        """As `run`, with NaN where a motion ends, or cannot begin: one among many may slide backwards, say."""
+        """Predicted columns (jobs, n), NaN for motions that end early or cannot begin (which raise errors in `run`)."""
         try:
             return self.run(values, begin, jobs)
         except (ParameterError, NotAvailable):
@@ -135,7 +136,7 @@ class MotionModel:
 
 
 class ResponseModel:
-    """Receptances as the machine has them about steady sliding.
+    """Model of measured receptances, from the machine linearised about steady sliding.
 
     Parameters
     ----------
@@ -148,7 +149,7 @@ class ResponseModel:
         self.ends = [coordinate_of(name) for name in data.names]
 
     def __call__(self, values: Mapping[str, Array], begin: Mapping[str, Array], jobs: int) -> Array:
-        """Real and imaginary parts of each pair, one after the other, (jobs, n)."""
+        """Predicted real and imaginary parts of each receptance, one after the other, (jobs, n)."""
         varied = dict(values) or {"drive.velocity": np.full(jobs, self.rig.drive.velocity)}
         point = operating_point(self.rig, varied)
         found = receptance(point, self.omega, [f"{e}.x" for e in self.ends], [f"{e}{PUSH}" for e in self.ends])

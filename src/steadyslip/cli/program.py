@@ -28,9 +28,9 @@ COMMANDS = (
     *(map_, sensitivity, reproduce, examples, init, schema),
 )
 WRITTEN = (".html", ".png", ".svg", ".pdf", ".csv", ".nc", ".toml")  # files that commands write
-GARBAGE = 50_000
-"""Objects created between two garbage collections: imports and formulas create some 10⁵ lasting ones, and Python's
-default of 700 takes a tenth of a verdict's time."""
+GARBAGE = 300_000
+"""Objects created between two garbage collections: more than a verdict creates, some 2·10⁵ by imports and formulas,
+most of which last. Python's default of 700 takes a tenth of its time."""
 
 
 class _Conversion:

@@ -17,6 +17,17 @@ Array = np.ndarray
 """Array of numbers; the function that takes or returns it states shape and unit."""
 
 
+def distinct(values: Array) -> tuple[Array, Array]:
+    """Distinct values (n,) in rising order, and the index of the first of each.
+
+    As `np.unique` gives with ``return_index``, without its import of masked arrays.
+    """
+    order = np.argsort(values, kind="stable")
+    rising = values[order]
+    first = np.append(True, rising[1:] != rising[:-1])[: len(values)]
+    return rising[first], order[first]
+
+
 def checked_array(name: str, role: Parameter, value: Any) -> Any:
     """Convert a varied parameter to a float array and check its domain; a DataArray keeps its dimensions.
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import multiprocessing
 import os
 import shlex
 import sys
@@ -222,6 +221,8 @@ def _reason(error: OSError) -> str:
 @cache
 def _warn_of(folder: Path, why: str, owner: int = -1) -> None:
     """Warn once per folder that nothing is cached, with reason and remedy; worker processes do not warn."""
+    import multiprocessing  # slow to import
+
     if multiprocessing.parent_process() is not None:
         return
     mend = ""

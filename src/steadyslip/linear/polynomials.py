@@ -57,7 +57,7 @@ def is_hurwitz(c: Array, spare: ArrayLike) -> NDArray[np.bool_]:
     result = np.zeros(len(flat), dtype=bool)
     degree = degrees(flat)
     posed = degree >= np.maximum(n - np.broadcast_to(spare, c.shape[:-1]).reshape(-1), 0)
-    for d in np.unique(degree[posed]):
+    for d in np.flatnonzero(np.bincount(degree[posed])):
         rows = np.flatnonzero(posed & (degree == d))
         result[rows] = np.all(routh_column(_in_own_time(flat[rows, : d + 1])) > 0, axis=-1)
     return result.reshape(c.shape[:-1])

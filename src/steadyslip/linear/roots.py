@@ -68,9 +68,7 @@ def roots(c: Array) -> ComplexArray:
     flat = np.ascontiguousarray(c.reshape(-1, n + 1))
     found: ComplexArray = np.full((len(flat), n), np.nan + 0j, dtype=complex)
     degree = degrees(flat)
-    for d in np.unique(degree):
-        if d < 1:
-            continue
+    for d in np.flatnonzero(np.bincount(degree[degree > 0])):
         rows = np.flatnonzero(degree == d)
         own = flat[rows, : d + 1]
         found[rows, :d] = _roots_of_degree(own)

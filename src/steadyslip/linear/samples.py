@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.core.arrays import distinct
 from steadyslip.core.domains import Domain
 
 Array = NDArray[np.float64]
@@ -34,7 +35,8 @@ def bounded(domain: Domain, share: int) -> Array:
     low = domain.low if domain.low_allowed else domain.low + near
     high = domain.high if domain.high_allowed else domain.high - near
     even = np.linspace(low, high, _LINEAR // share)
-    return np.unique(np.concatenate([even, towards(low, even[1], near, share), towards(high, even[-2], near, share)]))
+    ends = towards(low, even[1], near, share), towards(high, even[-2], near, share)
+    return distinct(np.concatenate([even, *ends]))[0]
 
 
 def unbounded(domain: Domain, zero: bool, size: float, least: float, most: float, share: int) -> Array:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.core.arrays import distinct
 from steadyslip.core.caching import cached
 from steadyslip.core.dimensions import Dimension, unit
 from steadyslip.core.errors import NoSteadySliding, NotAvailable
@@ -159,7 +160,7 @@ class Search:
         else:
             zero = domain.low_allowed and not self.role.adds_state
             found = samples.unbounded(domain, zero, self._sizes[0], *self._reach(between), self.share)
-        return np.unique(np.append(found, self.value))
+        return distinct(np.append(found, self.value))[0]
 
     @cached_property
     def _sizes(self) -> tuple[float, float]:
@@ -258,7 +259,7 @@ class Search:
 
     def _certain(self, x: Array) -> tuple[Array, NDArray[np.int64]]:
         """Samples with their kinds, without those whose status depends on rounding or whose roots cannot be counted."""
-        x = np.unique(x)
+        x, _ = distinct(x)
         if not x.size:
             return x, np.empty(0, dtype=np.int64)
         point = self.values(x)
@@ -428,7 +429,7 @@ def _kinds(point: OperatingPoint, status: NDArray[np.int64]) -> NDArray[np.int64
 
 def _merged(*parts: tuple[Array, NDArray[np.int64]]) -> tuple[Array, NDArray[np.int64]]:
     """Samples and their kinds, joined and sorted; one of each value."""
-    x, at = np.unique(np.concatenate([x for x, _ in parts]), return_index=True)
+    x, at = distinct(np.concatenate([x for x, _ in parts]))
     return x, np.concatenate([kind for _, kind in parts])[at]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
@@ -173,6 +172,8 @@ def run_many(
 
     At most two chunks per thread wait at any time, so that memory does not grow with the number of jobs.
     """
+    from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait  # slow to import
+
     count = threads or available_cores()
     chunk = max(lanes, min(chunk, -(-size // (4 * count))))
     chunk = -(-chunk // lanes) * lanes

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import Field, dataclass, fields
 from difflib import get_close_matches
-from importlib.metadata import entry_points
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
@@ -99,6 +98,8 @@ def find_law(family: type[FrozenRecord], name: object) -> type[FrozenRecord]:
     if isinstance(name, str):
         if name in family.registry:
             return family.registry[name]
+        from importlib.metadata import entry_points  # slow to import
+
         for entry in entry_points(group=ENTRY_POINTS, name=name):
             try:
                 law = entry.load()

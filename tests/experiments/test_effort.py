@@ -84,12 +84,12 @@ def test_a_search_without_an_end_has_no_errors():
     made = lab.record(lab.rig(), lab.STEP, 3, count=1500)
     fit = ss.fit(ss.lab_rig(), made, effort=5e-5)
     assert not fit.search.converged
-    assert "no error: the search had not come to its end" in str(fit)
+    assert "no error: the search was stopped before it ended" in str(fit)
     assert "not determined" not in str(fit)
     assert not [one for one in fit.remedies if one.gain > 6]
     answers = ss.experiments
     for ask in (answers.bootstrap, answers.posterior, answers.normal_draws, lambda one: answers.profile(one, "a")):
-        with pytest.raises(ss.NotAvailable, match="had not come to its end"):
+        with pytest.raises(ss.NotAvailable, match="was stopped before it ended"):
             ask(fit)
 
 

@@ -19,7 +19,7 @@ def test_a_record_counts_once():
         one.time[::2], friction=one.friction[::2], normal=one.normal[::2], displacement=one.displacement[::2]
     )
     for again in (one, thinned):
-        with pytest.raises(ss.ParameterError, match=r"record 2: is record 1 again .* an experiment counts once"):
+        with pytest.raises(ss.ParameterError, match=r"record 2: is record 1 again .* give each experiment once"):
             ss.fit(ss.lab_rig(), [one, again])
 
 
@@ -79,8 +79,8 @@ def test_a_quiet_end_off_the_model_is_told_beside_a_loud_record(unequal):
 
 
 @pytest.mark.parametrize(("calibrated", "said"), [
-    (lab.STIFFNESS * 1000, "a column or the calibration is in another unit"),
-    (lab.STIFFNESS * 1.5, "a channel that comes late or a servo that lags may make that"),
+    (lab.STIFFNESS * 1000, "a column or the calibration is probably in another unit"),
+    (lab.STIFFNESS * 1.5, "a channel that comes late or a servo that lags may be the cause"),
 ])  # fmt: skip
 def test_a_stiffness_far_off_its_calibration_is_in_another_unit(calibrated, said):
     fit = ss.fit(ss.lab_rig(), stepped(1), starts=9, calibrated=calibrated)

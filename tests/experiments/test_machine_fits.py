@@ -98,7 +98,7 @@ def test_the_mass_of_a_ring_down_is_open_beside_its_stiffness():
     free = ["spring.stiffness", "spring.damping", "table.mass"]
     found = ss.fit(oscillator(stiffness=45.0), ring, free, initial="free")
     assert not any(found[name].determined for name in free)
-    assert "tell them only together" in " ".join(str(found).split())
+    assert "determine them only in combination" in " ".join(str(found).split())
 
 
 def test_a_push_tells_the_mass_as_well():

@@ -93,7 +93,7 @@ def test_warnings_are_notes_below_the_printed_table(tmp_path):
     assert f"velocity step$^{{{numbers}}}$ & " in text
     _, below = text.split(r"\end{tabular}")
     assert below.count("$^{") == len(told)
-    assert "tell them only together" in below
+    assert "determine them only in combination" in below
     assert "%" not in below.replace(r"\%", "")
     assert "Values in parentheses are not determined" in table.methods
     assert "Notes to the table give the warnings of these fits" in table.methods

@@ -263,7 +263,7 @@ def test_a_search_that_did_not_converge_has_no_errors(tmp_path):
     assert not any(one.determined for one in other.estimates)
     assert other.derived == ()
     assert "95 %" not in str(other)
-    assert "the numbers are rough, and have no errors" in " ".join(str(other).split())
+    assert "the numbers are rough and have no errors" in " ".join(str(other).split())
     other.save(tmp_path / "fit.nc")
     assert str(ss.load_fit(tmp_path / "fit.nc")) == str(other)
 

@@ -1,4 +1,4 @@
-"""How far a record begins from steady sliding, where a fit of what came before it tells that."""
+"""Initial difference of a record from steady sliding, if it is known from a fit to the time before the record."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ class Beginning:
     values : dict of str to float
         Differences of friction and of each memory of it (e-folds), by name.
     spread : tuple of tuple of float
-        Changes of all of them by one standard deviation, in independent directions.
+        Changes of all differences by one standard deviation, in independent directions.
     """
 
     values: dict[str, float]
     spread: tuple[tuple[float, ...], ...] = ()
 
     def of(self, names: Collection[str]) -> Beginning:
-        """Differences of the named ones alone: a nested law may have fewer memories."""
+        """Beginning with only the named differences: a nested law may have fewer memories."""
         kept = [name for name in self.values if name in names]
         places = [list(self.values).index(name) for name in kept]
         spread = tuple(tuple(row[k] for k in places) for row in self.spread)
         return Beginning({name: self.values[name] for name in kept}, spread)
 
     def rows(self) -> Array:
-        """Values, then the spread in each direction, (1 + directions, k)."""
+        """Values, then the spread in each direction, as rows of an array (1 + directions, k)."""
         return np.array([[*self.values.values()], *self.spread])
 
     def ends(self) -> Array:
-        """Differences (1 + directions, k): as known, then one standard deviation away in each direction."""
+        """Differences (1 + directions, k): the known values, then one standard deviation away in each direction."""
         known, *spread = self.rows()
         return np.array([known, *(known + own for own in spread)])

@@ -31,11 +31,11 @@ class CommandedInputs:
     pressed : bool
         True if the normal stress of the record drives the model.
     pores : bool
-        True if the contact has pores into which the pressure drains; otherwise pore pressure columns_and_signs at once.
+        True if the contact has pores into which the pressure drains; otherwise pore pressure acts at once.
     lag : bool
         True to shift all changes by one free time.
     given : sequence of int
-        Places in `free` of durations that are given: tables have no derivatives in them.
+        Indices in `free` of durations that are held in a fit: tables have no derivatives by them.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class CommandedInputs:
         self.nodes = self._nodes()
 
     def _ramps_of(self, change: int) -> list[int]:
-        """Places in `ramps` of those of one change; empty for −1."""
+        """Indices in `ramps` of the ramps of one change; empty for −1."""
         return [j for j, (i, _) in enumerate(self.ramps) if i == change]
 
     def _nodes(self) -> Array:
@@ -80,7 +80,7 @@ class CommandedInputs:
         return np.asarray(self.time[held])
 
     def _cuts(self) -> Array:
-        """Further nodes, s, between samples where a curve deviates too much from straight lines."""
+        """Additional nodes, s, between samples where a curve deviates too much from straight lines."""
         found = [np.empty(0)]
         spacing = np.diff(self.time)
         for course in self.courses.values():
@@ -108,8 +108,10 @@ class CommandedInputs:
         return found + ([(-1, "hold")] if self.resting is not None else [])
 
     def table_of(self, times: Array, loads: Sequence[Course]) -> InputTable:
-        """Input table (loads, ...) for values of the free times (free,) and other load points, whose levels and shares
-        alone differ."""  # fmt: skip
+        """Input table (loads, ...) for values of the free times (free,) and several courses of the load point.
+
+        The courses may differ in levels and in the shares of pieces only.
+        """
         return _ManyLoads(self, loads).table(np.tile(times, (len(loads), 1)))
 
     def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
@@ -124,12 +126,12 @@ class CommandedInputs:
 
     @cached_property
     def moved(self) -> list[tuple[int, int, str]]:
-        """Free times in which tables have derivatives: index among the values, then as in `free`."""
+        """Free times by which tables have derivatives, as (index among the values, items as in `free`)."""
         return [(k, i, what) for k, (i, what) in enumerate(self.free) if k not in self.given]
 
     @cached_property
     def _times_of_ramps(self) -> Array:
-        """Begin (s) of each ramp at the time of its change, then after that, and its duration, (3, ramps)."""
+        """Rows (3, ramps) of the time of each ramp's change (s), the ramp's begin after it (s) and its duration (s)."""
         return (
             np.array([(self.changes[i][2].time, since, length) for i, (since, length, _) in self.ramps])
             .reshape(-1, 3)
@@ -138,12 +140,12 @@ class CommandedInputs:
 
     @cached_property
     def _ending(self) -> Array:
-        """Places of ramps that last, whose ends are nodes too."""
+        """Indices of ramps with a duration, whose ends are nodes too."""
         return np.flatnonzero(self._times_of_ramps[2] > 0)
 
     @cached_property
     def _moves(self) -> Array:
-        """Rates (moved, nodes) of nodes that are no samples: begins and ends of ramps, then of a rest."""
+        """Derivatives (moved, nodes) by free times of nodes that are no samples: ends of ramps, then of a hold."""
         ending = self._ending
         ramps = len(self.ramps) + len(ending)
         found = np.zeros((len(self.moved), ramps + (2 if self.resting is not None else 0)))
@@ -244,16 +246,16 @@ class CommandedInputs:
         return np.array([[self.courses[channel].first]])
 
     def _heights(self, channel: str) -> Array:
-        """Heights of all ramps, (jobs or 1, ramps); of other channels any."""
+        """Heights (jobs or 1, ramps) of the ramps of a channel; values for ramps of other channels are not used."""
         found = [share * (self.changes[i][2].after - self.changes[i][2].before) for i, (_, _, share) in self.ramps]
         return np.array(found).reshape(1, -1)
 
     def _rates_before_rest(self) -> Array | float | None:
-        """Rate of the load point before the rest with which the record begins, (jobs,) or one for all, m/s."""
+        """Rate of the load point before the hold with which the record begins, m/s; (jobs,) or the same for all."""
         return self.resting
 
     def _input_rates(self, nodes: Array, begins: Array, lengths: Array, first: int, directions: int) -> Array:
-        """Derivatives of the inputs at fixed times in the free times of ramps, (jobs, directions, rows, inputs)."""
+        """Derivatives (jobs, directions, rows, inputs) of the inputs at fixed times by the free times of ramps."""
         if not any(ramped > 0 for _, (_, ramped, _) in self.ramps):
             return np.zeros((1, 0, 0, self.inputs))
         middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
@@ -273,7 +275,7 @@ class CommandedInputs:
 
 
 class _ManyLoads(CommandedInputs):
-    """Input tables of several load points that differ in levels and shares, one for each job."""
+    """Input tables for several courses of the load point, one for each job, that differ in levels and shares only."""
 
     def __init__(self, like: CommandedInputs, loads: Sequence[Course]) -> None:
         self.__dict__.update(vars(like))
@@ -300,7 +302,7 @@ class _ManyLoads(CommandedInputs):
 
 
 def time_windows(changes: list[tuple[str, int, Change]]) -> list[tuple[float, float, float]]:
-    """Starting value, least and largest value, s, of each free time of the changes."""
+    """Starting value, smallest and largest value (s) of each free time or duration of the changes."""
     found = []
     for _, _, change in changes:
         if change.free:

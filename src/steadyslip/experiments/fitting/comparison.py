@@ -28,7 +28,7 @@ MAX_CACHED_SAMPLES = 200_000  # results with more samples in all are not cached,
 
 @dataclass(frozen=True, eq=False)
 class RecordPart:
-    """One record with the model that it is compared with.
+    """Record with the model with which it is compared.
 
     Attributes
     ----------
@@ -42,15 +42,15 @@ class RecordPart:
     data : ndarray (n,)
         Observed friction coefficient.
     weights : ndarray (n,)
-        One over the standard deviation of each sample, up to a common factor.
+        Reciprocal of the standard deviation of each sample, up to a common factor.
     rig_indices, time_indices, begin_indices, trend_indices : tuple of int
-        Indices among the unknowns of the rig's parameters, free times, initial state and trend coefficients.
+        Indices of the rig's parameters, free times, initial states and trend coefficients among the unknowns.
     given_indices : tuple of int
-        Of the free times, those that are given for each motion: the model has no derivatives in them.
+        Indices of free times that are held in a fit: the model has no derivatives by them.
     trend : ndarray (terms, n)
         Factors of the trend coefficients.
     known_begin : tuple of float
-        Initial differences from steady sliding, in order of `Forward.unsettled`, where they are known.
+        Initial differences from steady sliding, in the order of `Forward.unsettled`, if they are known.
     """
 
     record: Record
@@ -69,11 +69,11 @@ class RecordPart:
 
     @cached_property
     def moved_indices(self) -> tuple[int, ...]:
-        """Indices among the unknowns of the free times in which the model has derivatives."""
+        """Indices, among the unknowns, of the free times by which the model has derivatives."""
         return tuple(place for place in self.time_indices if place not in self.given_indices)
 
     def begin(self, values: Array) -> Array:
-        """Initial differences from steady sliding (m, k) at values (m, p) of the unknowns: known, or free."""
+        """Initial differences (m, k) from steady sliding, known or free, at values (m, p) of the unknowns."""
         if self.known_begin:
             return np.tile(self.known_begin, (len(values), 1))
         return np.asarray(values[:, list(self.begin_indices)])
@@ -95,22 +95,22 @@ class RecordPart:
         )
 
     def states(self, values: Array) -> dict[str, Array]:
-        """Friction without a trend, and each memory of it, (m, n) at values (m, p) of the unknowns."""
+        """Friction without a trend, and each memory variable of it, (m, n) at values (m, p) of the unknowns."""
         own, table, begin = values[:, list(self.rig_indices)], self.table(values, sensitive=False), self.begin(values)
         memories = [item.name for item in self.forward.model.memory if item.unit == "1"]
         models = {"friction": self.without_derivatives} | {name: self._observing(name) for name in memories}
         return {name: forward.run(table, own, own, begin)[:, 0] for name, forward in models.items()}
 
     def begun_from(self, values: Array, begins: Array) -> Array:
-        """Friction (m, n), without a trend, at values (p,) of the unknowns from other beginnings (m, k)."""
+        """Friction (m, n) without a trend at values (p,) of the unknowns, for several initial differences (m, k)."""
         many = np.tile(values, (len(begins), 1))
         own = many[:, list(self.rig_indices)]
         return np.asarray(self.without_derivatives.run(self.table(many, sensitive=False), own, own, begins)[:, 0])
 
     def driven_by(self, values: Array, loads: Sequence[Course]) -> Array:
-        """Friction (loads, n), without a trend, at values (p,) of the unknowns for other load points of the same times.
+        """Friction (loads, n) without a trend at values (p,) of the unknowns, for several courses of the load point.
 
-        All are run at once, without derivatives.
+        The times of changes are those of the unknowns. All are run at once, without derivatives.
         """
         if not isinstance(self.inputs, CommandedInputs):
             raise InternalError("only the commanded loading has other courses")
@@ -126,13 +126,13 @@ class RecordPart:
 
 
 class DataComparison:
-    """Data and a model of them, of which a subclass tells values and derivatives.
+    """Comparison of data with a model, whose values and derivatives a subclass computes.
 
     Parameters
     ----------
     data, weights : sequence of ndarray
-        Data, and one over the standard deviation of each sample up to a common factor, for every series whose noise is
-        its own.
+        Data, and reciprocal of the standard deviation of each sample up to a common factor, for every series with
+        independent noise.
     space : Space
         Unknowns of the fit.
     loss : str
@@ -158,8 +158,8 @@ class DataComparison:
     def model(self, coordinates: Array) -> tuple[Array, Array]:
         """Model (m, n) and derivatives (m, p, n) at coordinates (m, p), not weighted; read-only arrays.
 
-        The results of points that were run alone are cached: errors at a minimum that was just checked cost no run.
-        Those of several are not, since a motion that is completed among others may fail alone.
+        Results of single points are cached, so that errors at a minimum need no further run. Results of several points
+        at once are not: a motion that is completed among others may fail if it is run alone.
         """
         if len(coordinates) == 1:
             for point, own, slopes in self._recent:
@@ -171,7 +171,7 @@ class DataComparison:
         return predicted, jacobian
 
     def residuals(self, coordinates: Array, data: Array | None = None) -> tuple[Array, Array]:
-        """Weighted residuals (m, n), data less model, and derivatives (m, p, n) of the model, both scaled by the loss.
+        """Weighted residuals (m, n), data minus model, and derivatives (m, p, n) of the model, both scaled by the loss.
 
         Parameters
         ----------
@@ -190,13 +190,13 @@ class DataComparison:
 
 
 class Comparison(DataComparison):
-    """All records of a fit of a slider with their models.
+    """Comparison of all records of a fit of a slider with their models.
 
     Parameters
     ----------
     parts : sequence of RecordPart
     space, loss, width
-        As of `DataComparison`.
+        As for `DataComparison`.
     """
 
     def __init__(self, parts: tuple[RecordPart, ...], space: Space, loss: str = "linear", width: float = 1.0) -> None:
@@ -238,7 +238,7 @@ class Comparison(DataComparison):
 
 
 def scaled_by_loss(loss: str, r: Array, width: float) -> tuple[Array, Array]:
-    """Scaled residuals whose squares are the loss, and their derivatives with respect to the residuals `r`."""
+    """Scaled residuals whose squares are the loss of residuals `r`, and their derivatives by `r`; of the same shape."""
     z = np.maximum((r / width) ** 2, 1e-20)
     with np.errstate(all="ignore"):
         if loss == "soft-l1":
@@ -262,7 +262,7 @@ def jump_unknowns(record: int | None, sharp: Sharp) -> list[Unknown]:
 
 
 def step_unknowns(record: int | None, loading: Loading, pressed: bool) -> list[Unknown]:
-    """Unknown times and durations, s, of commanded changes that the measured columns do not determine."""
+    """Unknown times and durations, s, of commanded changes, if the measured columns do not determine them."""
     label = "" if record is None else f"@{record + 1}"
     changes = [one for one in loading.changes if pressed or one[0] == "load"]
     found = []
@@ -276,12 +276,12 @@ def step_unknowns(record: int | None, loading: Loading, pressed: bool) -> list[U
     return found
 
 
-MAX_LAG = 0.02  # largest lag between the channels, as a share of the record; larger ones are visible
-MIN_HOLD, MAX_HOLD = 1e-3, 1e5  # bounds of the rest before a record that begins at rest, as shares of it
+MAX_LAG = 0.02  # largest lag between the channels, as a share of the record; larger lags are visible
+MIN_HOLD, MAX_HOLD = 1e-3, 1e5  # bounds of the hold before a record that begins at rest, as shares of the record
 
 
 def start_unknowns(record: int | None, loading: Loading, span: float, lag: bool) -> list[Unknown]:
-    """Unknowns of a record's start: lag (s) of friction behind the loading, hold (s) before one that begins at rest."""
+    """Unknowns of a record: lag (s) of friction behind the loading, hold (s) before it if it begins at rest."""
     label = "" if record is None else f"@{record + 1}"
     found = []
     if lag:
@@ -294,7 +294,7 @@ def start_unknowns(record: int | None, loading: Loading, span: float, lag: bool)
     return found
 
 
-MAX_INITIAL = 30.0  # bound of the initial distance from steady sliding, in natural sizes (e-folds of a state)
+MAX_INITIAL = 30.0  # largest initial difference from steady sliding, in natural sizes (e-folds of a state)
 
 
 def initial_unknowns(record: int | None, sizes: dict[str, float]) -> list[Unknown]:
@@ -318,7 +318,7 @@ def trend_unknowns(record: int | None, order: int, offset: bool) -> list[Unknown
 def trend_rows(record: Record, order: int, offset: bool, axis: str, moved: Array | None = None) -> Array:
     """Factors (terms, n) of the trend coefficients: powers of the elapsed share of the displacement, or of the time.
 
-    `moved` is the commanded displacement (m), where known; it replaces the measured one.
+    `moved` is the commanded displacement (m) if it is known; it replaces the measured one.
     """
     driven = record.displacement if moved is None else moved
     along: Any = record.time if axis == "time" or driven is None else driven

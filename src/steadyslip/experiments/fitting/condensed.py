@@ -1,9 +1,10 @@
-"""Condensed least squares: the sum of squares of all samples from the model at few of them.
+"""Condensed least squares: the sum of squares over all samples, computed from the model at a few of them.
 
-Between changes of the loading, model friction is a smooth curve: a polynomial through a few samples gives it at all
-others. The sum of squares over all samples then equals one over these few, with transformed data and weights, plus a
-constant. The noise is averaged as before, and the model is computed at far fewer samples. Around the changes, whose
-times are free, all samples are kept. The constants were chosen by trial; they trade accuracy against time.
+Between changes of the loading, the friction of the model is a smooth curve, which a polynomial through a few samples
+gives at all others. The sum of squares over all samples then equals a sum over these few, with transformed data and
+weights, plus a constant. The noise is averaged as before, and the model is computed at far fewer samples. Around the
+changes, whose times are free, all samples are kept. The constants were chosen by trial; they trade accuracy against
+time.
 """
 
 from __future__ import annotations
@@ -22,16 +23,15 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.loading.loading import Loading
 
 NODES = 7  # nodes of each polynomial (degree 6)
-INTERPOLATION_ERROR = (
-    1e-3  # largest interpolation error: of the residuals' scatter (model), of the largest value (derivatives)
-)
+INTERPOLATION_ERROR = 1e-3
+"""Largest interpolation error: relative to the residuals' scatter (model) or to the largest value (derivatives)."""
 MAX_KEPT_SHARE = 0.5  # samples are condensed if at most this share of them remains
 MAX_REFERENCES = 3  # number of motions from which the nodes are chosen
 MARGIN = 2  # samples kept on both sides of the window of a change
 
 
 class Condensed:
-    """Comparison on few samples with the sum of squares of all, near given coordinates.
+    """Comparison that computes the model at few samples and has the sum of squares of all, near given coordinates.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Condensed:
         self.constant = float(np.sqrt(max(constant, 0.0)))
 
     def residuals(self, coordinates: Array) -> tuple[Array, Array]:
-        """Residuals and derivatives like those of `Comparison.residuals`, with the sum of squares of all samples."""
+        """Residuals and derivatives as in `Comparison.residuals`, with the sum of squares of all samples."""
         predicted, slopes = self.few.model(coordinates)
         r = np.empty((len(predicted), self.size + 1))
         rows = np.zeros((len(predicted), len(self.space), self.size + 1))
@@ -80,7 +80,7 @@ class Condensed:
 
 
 def condensed(plan: Any, whole: DataComparison, coordinates: Array) -> DataComparison | Condensed:
-    """Condensed comparison near coordinates (m, p), the best first; `whole` itself where condensing does not pay."""
+    """Condensed comparison near coordinates (m, p), the best first; `whole` itself if condensing saves no time."""
     if not len(coordinates) or not _possible(plan) or not isinstance(whole, Comparison):
         return whole
     return condensed_along(plan, whole, *whole.model(coordinates[:MAX_REFERENCES]))
@@ -121,7 +121,7 @@ class _Element:
 
 
 class _Interpolation:
-    """Kept samples of one record, and the interpolation of the others from them."""
+    """Kept samples of one record, and the interpolation from them to all samples."""
 
     def __init__(self, time: Array, curves: Array, held: list[tuple[int, int]]) -> None:
         keep = np.zeros(len(time), dtype=bool)
@@ -147,9 +147,8 @@ class _Interpolation:
             i, j = waiting.pop()
             if j - i < 2 * NODES:
                 nodes = np.arange(i, j + 1)
-                for k in range(
-                    0, len(nodes) - 1, NODES - 1
-                ):  # all samples are kept, in groups that keep the band narrow
+                # all samples are kept, in groups that keep the band of the matrix narrow
+                for k in range(0, len(nodes) - 1, NODES - 1):
                     part = nodes[k : k + NODES]
                     self.elements.append(_Element(int(part[0]), int(part[-1]), part, np.eye(len(part))))
                 continue

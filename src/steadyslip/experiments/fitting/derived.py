@@ -1,4 +1,4 @@
-"""Numbers that follow from fitted parameters: a − b, critical stiffness, and ratios of stiffnesses, with errors."""
+"""Quantities that follow from fitted parameters, with errors: a − b, critical stiffness, ratios of stiffnesses."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from steadyslip.linear.stiffness import critical_stiffness
 from steadyslip.machine.slider import Slider
 
 DERIVED = ("a - b", "k_c", "k/k_c", "k/k_cal")
-TOGETHER = 0.1  # e-folds or natural sizes to which a number must be known: beyond, models with open directions curve
+TOGETHER = 0.1
+"""Largest error (e-folds or natural sizes) of a quantity that is given although its parameters are not determined."""
 SIZE = 0.01  # natural size of a - b, as of b
-LIKELY = 1.96  # standard deviations that the places stand for which fit as well: 95 %
-STEP = 1e-2  # of a standard deviation, for slopes: far above rounding, and what is curved is that by less than 1e-2
-LARGEST = 1e-2  # e-folds of which a step is a share at most: errors along open directions are small differences
+LIKELY = 1.96  # distance of points that fit as well, in standard deviations: 95 %
+STEP = 1e-2  # step of finite differences, in standard deviations: far above rounding, with little effect of curvature
+LARGEST = 1e-2  # largest standard deviation, in e-folds, for a step: those along open directions are too large
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """Least sum of squares of a fit: coordinates (p,) in `space`, their covariance (p, p), and degrees of freedom.
+    """Minimum of a fit: coordinates (p,) in `space`, their covariance (p, p), and degrees of freedom.
 
-    `joint` has errors of numbers that data tell although not of all parameters in them, by name and record; see
-    `joint_errors`.
+    `joint` holds errors of quantities that the data determine although not all their parameters, by name and record;
+    see `joint_errors`.
     """
 
     space: Space
@@ -39,36 +40,36 @@ class Minimum:
 
     @property
     def deviations(self) -> Array:
-        """Standard deviations of the coordinates (p,), inf where one is not determined."""
+        """Standard deviations (p,) of the coordinates, inf for those that are not determined."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def steps(self) -> Array:
-        """Steps of coordinates (p,) for slopes, 0 where one is not determined."""
+        """Steps (p,) of the coordinates for finite differences, 0 for those that are not determined."""
         return STEP * np.where(np.isfinite(self.deviations), np.minimum(self.deviations, LARGEST), 0.0)
 
     @property
     def lost(self) -> set[str]:
-        """Parameters that are not determined, or of which rounding leaves nothing."""
+        """Names of parameters that are not determined, or have no step for finite differences."""
         return {one.parameter for one, step in zip(self.space.unknowns, self.steps, strict=True) if not step > 0}
 
 
 def derived_estimates(
     minimum: Minimum, rigs: Sequence[Slider], calibrated: float | None = None
 ) -> tuple[Estimate, ...]:
-    """Numbers that follow from the parameters of a rate-and-state law, with errors to first order.
+    """Quantities that follow from the parameters of a rate-and-state law, with errors to first order.
 
-    ``a - b`` is a less the sum of all b; ``k_c`` (Pa/m) and ``k/k_c`` are at the velocity and normal stress of the
-    record. What a law does not have, or no record determines, is left out; ``a - b`` may be determined where neither a
-    nor b is. Of several records each has its own, with ``@1`` and so on behind the name, unless they are alike.
+    ``a - b`` is a minus the sum of all b; ``k_c`` (Pa/m) and ``k/k_c`` are at the velocity and normal stress of the
+    record. Quantities that the law does not have, or that no record determines, are left out; ``a - b`` may be
+    determined even if neither a nor b is. If values differ between records, their names end with ``@1`` and so on.
 
     Parameters
     ----------
     minimum : Minimum
     rigs : sequence of Slider
-        Of each record, with its rate and normal stress.
+        Rig of each record, with its rate and normal stress.
     calibrated : float, optional
-        Stiffness of the machine, Pa/m; the fitted one over it is ``k/k_cal``.
+        Stiffness of the machine from a calibration, Pa/m; ``k/k_cal`` is the ratio of the fitted stiffness to it.
     """
     found: dict[str, list[Estimate]] = {}
     for record, rig in enumerate(rigs):
@@ -83,9 +84,10 @@ def derived_estimates(
 
 @dataclass(frozen=True, eq=False)
 class _Derived:
-    """Values (m,) of a number, with the parameters that it needs; errors are of its logarithm where `logarithmic`.
+    """Values (m,) of a derived quantity, with the names of the parameters that it depends on (`needed`).
 
-    `levels` are a and all b, of which steady sliding tells the difference.
+    If `logarithmic`, errors are those of its logarithm. `levels` are the names of a and all b, whose difference steady
+    sliding determines.
     """
 
     name: str
@@ -99,7 +101,7 @@ class _Derived:
 def derived_values(
     space: Space, rigs: Sequence[Slider], calibrated: float | None, coordinates: Array
 ) -> dict[str, Array]:
-    """Values (m,) at coordinates (m, p) by name, alone and with ``@1`` and so on behind it; NaN for what is not."""
+    """Derived values (m,) at coordinates (m, p), by name and by name with ``@1`` and so on; NaN if undefined."""
     found: dict[str, Array] = {}
     for record, rig in enumerate(rigs, start=1):
         for one in _of_rig(space, rig, record - 1, calibrated, coordinates):
@@ -133,7 +135,7 @@ def _of_rig(space: Space, rig: Slider, record: int, calibrated: float | None, pl
         edge, share = (
             np.broadcast_to(np.asarray(number(rig, own)), len(places)) for number in (critical_stiffness, safety_factor)
         )
-    except (NotAvailable, ParameterError):  # a law without an edge, or draws that no rig has
+    except (NotAvailable, ParameterError):  # a law without an edge of stability, or impossible values among draws
         edge = share = np.full(len(places), np.nan)
     found.append(_Derived("k_c", "Pa/m", edge, True, set(own) - {"slider.stiffness"}, levels))
     found.append(_Derived("k/k_c", "1", share, True, set(own), levels))
@@ -146,11 +148,12 @@ def _of_rig(space: Space, rig: Slider, record: int, calibrated: float | None, pl
 def joint_errors(
     minimum: Minimum, rigs: Sequence[Slider], calibrated: float | None, lost: set[str], near: Array
 ) -> dict[str, float]:
-    """Standard deviations (of logarithms, where positive) of numbers of which a parameter in `lost` has none, by name.
+    """Standard deviations of derived quantities that need an undetermined parameter (in `lost`), by name.
 
-    ``a - b`` may be told where neither a nor b is, and then k_c where the slip distance is. An error reaches to the
-    number at each of the places `near` (m, p) that fit as well; numbers that are not known well are left out. Names end
-    with ``@1`` and so on.
+    The data may determine ``a - b`` although neither a nor b, and then also k_c if they determine the slip distance.
+    An error includes the change of the quantity at other points `near` (m, p) that fit as well; quantities with a large
+    error are left out. Standard deviations of positive quantities are those of the logarithm. Names end with ``@1`` and
+    so on.
     """
     found = {}
     for record, rig in enumerate(rigs):
@@ -171,7 +174,7 @@ def joint_errors(
 
 
 def _at_minimum(minimum: Minimum, rig: Slider, record: int, calibrated: float | None) -> list[_Derived]:
-    """Values at the minimum, then a step up and a step down in each coordinate."""
+    """Derived quantities at the minimum, then after a step up and a step down in each coordinate."""
     steps = minimum.steps
     places = minimum.coordinates + np.concatenate([np.zeros((1, len(steps))), np.diag(steps), -np.diag(steps)])
     return _of_rig(minimum.space, rig, record, calibrated, places)
@@ -185,14 +188,14 @@ def _of_record(minimum: Minimum, rig: Slider, record: int, calibrated: float | N
 
 
 def _counted(one: _Derived, values: Array) -> Array:
-    """Values, or their logarithms where errors are of these; inf where there are none."""
+    """Values (m,), or their logarithms if errors refer to these; inf if undefined."""
     with np.errstate(all="ignore"):
         found = np.log(values) if one.logarithmic else values
     return np.where(np.isfinite(found), found, np.inf)
 
 
 def _error(minimum: Minimum, one: _Derived, name: str) -> float:
-    """Standard deviation to first order, from a number `_at_minimum`; inf where it does not exist."""
+    """Standard deviation, to first order, of a quantity from `_at_minimum`; inf if it is not determined."""
     if one.needed & minimum.lost:
         return minimum.joint.get(name, np.inf)
     x, count, known = _counted(one, one.values), len(minimum.coordinates), minimum.steps > 0
@@ -204,7 +207,7 @@ def _error(minimum: Minimum, one: _Derived, name: str) -> float:
 
 
 def _estimate(minimum: Minimum, area: float | None, one: _Derived, error: float) -> Estimate:
-    """Estimate of a number `_at_minimum` with its standard deviation, which is that of the logarithm if positive."""
+    """Estimate of a quantity from `_at_minimum`; `error` is the standard deviation, of the logarithm if positive."""
     from scipy.stats import t
 
     value = float(one.values[0])

@@ -1,7 +1,7 @@
-"""Limits on the work of a fit, counted in integration steps: it ends at the same point on every machine.
+"""Limits on the work of a fit, counted in integration steps, so that fits are the same on every computer.
 
-The limits were chosen by trial so that nearly all fits converge within them; larger ones cost time in fits whose model
-cannot follow the record.
+The limits were chosen by trial so that nearly all fits converge within them; larger limits cost time in fits whose
+model cannot follow the record.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Budget:
     """Budget of work, and the work that is spent.
 
     Eight motions are integrated side by side, one per SIMD lane. One unit of work is one step of the slowest of them,
-    for each number that a motion carries: its state and the derivatives of it.
+    for each number that a motion carries (state variables and their derivatives).
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Budget:
         return cls(MODELS * scale * work_of_search(samples, unknowns), scale)
 
     def spend(self, steps: Array, carried: int) -> None:
-        """Add the work of motions that took `steps`, (jobs,), and carried a number of values each."""
+        """Add the work of motions that took `steps` (jobs,) and carried a number of values each."""
         groups = np.zeros(-(-len(steps) // LANES) * LANES)
         groups[: len(steps)] = steps
         self.spent += float(np.sum(np.max(groups.reshape(-1, LANES), axis=1, initial=0.0))) * carried

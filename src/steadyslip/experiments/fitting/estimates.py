@@ -19,18 +19,18 @@ class Estimate(Displayed):
     Attributes
     ----------
     name : str
-        Dotted name; ``@2`` behind it where it belongs to the second record alone.
+        Dotted name, followed by ``@2`` if it belongs to the second record only.
     value, error : float
-        Estimate and standard deviation in SI units; the error is inf where the records do not determine the parameter.
+        Estimate and standard deviation in SI units; the error is inf if the records do not determine the parameter.
     unit : str
     low, high : float
         Ends of the 95 % interval.
     area : float or None
         Contact area of the rig, m²; if given, text shows totals for the whole contact.
     along : tuple of str
-        Parameters that change together with one that is not determined.
+        If the parameter is not determined, other parameters that change together with it.
     ended : bool
-        False if the search had not come to its end, so that nothing is known of the error.
+        False if the search was stopped before it ended, so that the error is unknown.
     """
 
     name: str
@@ -51,9 +51,9 @@ class Estimate(Displayed):
         return f"{self.name} = {self.shown()}"
 
     def shown(self) -> str:
-        """Format value and error with units, as printed."""
+        """Value and error with units, as text."""
         if not self.determined:
-            time = self.unit == "s"  # one on the record's clock needs its digits
+            time = self.unit == "s"  # times on the record's clock need many digits
             value = f"{self.value:.7g} s" if time else format_quantity(self.value, self.unit, area=self.area)
             return f"{value} ({self.undetermined})"
         if self.unit == "s":
@@ -62,25 +62,25 @@ class Estimate(Displayed):
 
     @property
     def undetermined(self) -> str:
-        """Words in place of an error that is infinite."""
+        """Text in place of an infinite error."""
         if not self.ended:
-            return "no error: the search had not come to its end"
+            return "no error: the search was stopped before it ended"
         together = f" (with {', '.join(self.along)})" if self.along else ""
         return f"not determined by these data{together}"
 
     def range(self) -> str:
-        """Format the 95 % interval with units, as printed."""
+        """95 % interval with units, as text."""
         if self.unit == "s":
             return f"{self.low:.7g} to {self.high:.7g} s"
         return format_range(self.low, self.high, self.unit, self.area)
 
 
-UNDETERMINED = 0.5  # standard deviation, in e-folds or natural sizes, above which a direction is not determined
+UNDETERMINED = 0.5  # a direction is open (undetermined) above this standard deviation, in e-folds or natural sizes
 MIN_WEIGHT = 0.15  # least weight of a parameter named in a combination; smaller ones only lengthen the message
 MIN_CHANGE = 0.1  # a parameter is also named if one standard deviation along the direction changes it by this much
-LEAST_CHANGE = 0.01  # e-folds or natural sizes by which an open direction changes what it leaves undetermined
-MOST_REACH = 2.0  # e-folds or natural sizes along an open direction that count: nobody believes further
-OPEN_SHARE = 0.1  # least share of a parameter's variance by which it belongs to an open direction: .3 of its error
+LEAST_CHANGE = 0.01  # least change of a parameter along an open direction that makes it undetermined; e-folds or sizes
+MOST_REACH = 2.0  # largest change along an open direction, in e-folds or natural sizes: more is not plausible
+OPEN_SHARE = 0.1  # an open direction makes a parameter undetermined from this share of its variance (.3 of its error)
 EIGENVALUE_ROUNDING = 1e-13  # eigenvalues of the scaled information below this share of the largest are rounding errors
 DERIVATIVE_ROUNDING = 1e-10  # derivatives below this share of the largest are rounding errors of the integration
 
@@ -107,14 +107,14 @@ class Combination:
         sides = [[name for name, w in self.weights.items() if (w > 0) is up] for up in (True, False)]
         moved = " with ".join(f"{', '.join(names)} {way}" for names, way in zip(sides, ("up", "down"), strict=True)
                               if names)  # fmt: skip
-        return f"{moved} fits as well: these data tell them only together; fix one of them"
+        return f"{moved} fits as well: these data determine them only in combination; fix one of them"
 
 
 def whole_covariance(information: Array, spread: Array) -> Array:
-    """Covariance (p, p) of the coordinates, of those too that `combinations` leaves without an error.
+    """Covariance (p, p) of the coordinates, finite also for those that `combinations` leaves without an error.
 
-    Along directions of which the data tell little or nothing it goes as far as anybody believes: more would leave
-    rounding of what they tell.
+    Along directions that the data hardly determine, the deviation is limited to `MOST_REACH`: larger numbers would hide
+    the others behind rounding errors.
     """
     values, directions, known = _directions(information)
     largest = np.max(np.abs(directions), axis=0)
@@ -127,7 +127,7 @@ def whole_covariance(information: Array, spread: Array) -> Array:
 
 
 def _directions(information: Array) -> tuple[Array, Array, Array]:
-    """Information (p,) on independent directions, these (p, p) in columns, and mask of those with an effect."""
+    """Information (p,) on independent directions, the directions (p, p) as columns, and mask (p,) of usable ones."""
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     insensitive = size <= DERIVATIVE_ROUNDING * max(float(size.max(initial=0.0)), 1e-300)
     scale = np.where(insensitive, 1.0, size)
@@ -150,7 +150,7 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
     Returns
     -------
     covariance : ndarray (p, p)
-        inf on the diagonal where a parameter is not determined.
+        inf on the diagonal for parameters that are not determined.
     found : tuple of Combination
     """
     values, directions, known = _directions(information)
@@ -181,12 +181,12 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
 
 
 def is_time(one: Unknown) -> bool:
-    """True for times of changes, which samples bound on both sides whatever the other parameters are."""
+    """True for times of changes: samples on both sides bound them, whatever the other parameters are."""
     return one.parameter.startswith(("jump.", "step."))
 
 
 def combination(direction: Array, deviation: float, space: Space, lost: Array) -> Combination:
-    """Combination of parameters along a direction (p,): those that it leaves without an error, and large parts."""
+    """Combination of parameters along a direction (p,): those in the mask `lost` (p,), and those that change much."""
     weights = direction / direction[np.argmax(np.abs(direction))]
     least = min(MIN_WEIGHT, max(MIN_CHANGE / deviation, 0.01))
     order = [i for i in np.argsort(-np.abs(weights)) if lost[i] or abs(weights[i]) >= least]
@@ -194,11 +194,11 @@ def combination(direction: Array, deviation: float, space: Space, lost: Array) -
 
 
 def prior_information(space: Space) -> Array:
-    """Prior information (p, p) on times, from the windows in which they are searched: inverse variances.
+    """Prior information (p, p) on times of changes, as inverse variances from the windows in which they are searched.
 
-    A time that the data do not tell ends at either end of its window, half of its width, 1 in coordinates, from the
-    middle. Windows are several errors wide where a noisy displacement made them, so that a uniform distribution, whose
-    variance is a third of that, would make errors too small: the search does not know of it.
+    A time that the data do not determine ends at an end of its window, which is half its width (1/2 in coordinates)
+    from the middle; this distance is taken as standard deviation. A uniform distribution has a third of its variance,
+    but errors would then be too small, because the search does not use it.
     """
     known = np.zeros((len(space), len(space)))
     for i, one in enumerate(space.unknowns):

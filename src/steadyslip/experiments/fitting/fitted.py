@@ -1,4 +1,4 @@
-"""Result of a search for least squares: estimates with errors, residuals, criteria; of any rig and record."""
+"""Result of a least-squares fit of any rig: estimates with errors, residuals and information criteria."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Fitted(ReadOnly):
     noise : tuple of Noise
         Autocorrelation of the residuals of every record.
     covariance : ndarray (p, p)
-        Covariance of the coordinates; infinite where a parameter is not determined.
+        Covariance of the coordinates; infinite for parameters that are not determined.
     unidentified : tuple of Combination
         Combinations of parameters that the records do not determine.
     bounds : tuple of two ndarray (p,)
@@ -106,20 +106,21 @@ class Fitted(ReadOnly):
         return max(low, one.low), min(high, one.high)
 
     def check_ended(self) -> None:
-        """Check that the search has come to a minimum, without which nothing is known of errors.
+        """Check that the search has reached a minimum, without which errors are unknown.
 
         Raises
         ------
         NotAvailable
+            If the search was stopped before, or too few of its starts lead to the minimum.
         """
         if not self.search.converged:
             raise NotAvailable(
-                "the search of this fit had not come to its end, or too few of its starts lead there, so that nothing "
-                "is known of its errors; let it search longer (effort, starts), or fit another model"
+                "the search of this fit was stopped before it ended, or too few of its starts lead to its minimum, so "
+                "that its errors are unknown; let it search longer (effort, starts), or fit another model"
             )
 
     def _reach(self, level: float) -> float:
-        """Standard deviations to the end of an interval."""
+        """Number of standard deviations from an estimate to an end of its interval."""
         from scipy.stats import t
 
         if not 0 < level < 1:
@@ -150,7 +151,7 @@ class Fitted(ReadOnly):
 
     @cached_property
     def whiteness(self) -> Whiteness:
-        """Test of the residuals for structure: more than white noise and noise that decays exponentially."""
+        """Test of the residuals for structure beyond white noise and noise with exponentially decaying correlation."""
         return whiteness(self.scaled_residuals[where] for where in self.comparison.slices)
 
     @property
@@ -159,22 +160,22 @@ class Fitted(ReadOnly):
 
     @property
     def degrees(self) -> int:
-        """Degrees of freedom: samples less parameters."""
+        """Degrees of freedom: number of samples minus number of parameters."""
         return self.samples - len(self.space)
 
     @cached_property
     def model(self) -> Array:
-        """What the records have, of the fitted model, trends included, at all samples (n,): friction of a slider."""
+        """Prediction of the fitted model with trends at all samples (n,): friction, or columns of a machine."""
         return np.asarray(read_only(self.comparison.model(self.coordinates[None])[0][0]))
 
     @property
     def residuals(self) -> Array:
-        """Residuals (n,): what was measured less what the model has."""
+        """Residuals (n,): measured values minus the prediction of the model."""
         return np.asarray(read_only(self.comparison.data - self.model))
 
     @property
     def scaled_residuals(self) -> Array:
-        """Residuals (n,) weighted and scaled by the loss: what the sum of squares is of."""
+        """Residuals (n,) weighted and scaled by the loss; the sum of their squares is minimised."""
         r = self.residuals * self.comparison.weights
         return r if self.plan.loss == "linear" else scaled_by_loss(self.plan.loss, r, self.comparison.width)[0]
 
@@ -189,7 +190,7 @@ class Fitted(ReadOnly):
 
     @cached_property
     def correlation(self) -> Array:
-        """Correlation matrix (p, p) of the estimates; NaN where one is not determined."""
+        """Correlation matrix (p, p) of the estimates; NaN for parameters that are not determined."""
         with np.errstate(all="ignore"):
             size = np.sqrt(np.diag(self.covariance))
             found: Array = self.covariance / np.outer(size, size)
@@ -198,46 +199,51 @@ class Fitted(ReadOnly):
 
     @property
     def aic(self) -> float:
-        """Akaike's information criterion, with the fit's own noise; `compare_laws` gives laws one noise in common."""
+        """Akaike's information criterion, with the noise of this fit; `compare_laws` uses one noise for all laws."""
         return self.criteria(self.noise)[0]
 
     @property
     def bic(self) -> float:
-        """Schwarz's (Bayesian) information criterion, with the fit's own noise as `aic`."""
+        """Schwarz's (Bayesian) information criterion, with the noise of this fit (see `aic`)."""
         return self.criteria(self.noise)[1]
 
     def criteria(self, noise: Sequence[Noise]) -> tuple[float, float]:
-        """AIC and BIC with the number of independent samples that a noise model of each record gives."""
+        """AIC and BIC, with the number of independent samples from a noise model of each record."""
         deviance = independent = 0.0
         for i, one in enumerate(noise):
             weights = self.part(self.comparison.weights, i)
             r = self.part(self.residuals, i) * weights
             worth = len(r) / max(one.inflation, 1.0)
-            unit = np.mean(np.log(weights[weights > 0]))  # in which weights are, which fits need not have in common
+            unit = np.mean(np.log(weights[weights > 0]))  # scale of the weights, which may differ between fits
             deviance += worth * float(np.log(np.mean(r**2)) - 2 * unit)
             independent += worth
         size = len(self.space)
         return deviance + 2 * size, deviance + size * float(np.log(max(independent, 2.0)))
 
     def with_open(self, covariance: Array, near: Array) -> Self:
-        """The same fit; of a slider, with errors of what follows from parameters that have none.
+        """Fit with errors of derived quantities that are determined although their parameters are not.
+
+        Only fits of sliders have derived quantities; other fits are returned unchanged.
 
         Parameters
         ----------
         covariance : ndarray (p, p)
-            Of the coordinates, of those too that are not determined.
+            Covariance of the coordinates, finite also for those that are not determined.
         near : ndarray (m, p)
-            Places that fit as well.
+            Coordinates of other points that fit as well.
         """
         return self
 
     def with_memories(self) -> Self:
-        """The same fit; of a slider, without an error of what a memory of normal stress moves far that fits as well."""
+        """Fit without errors of parameters that a memory of normal stress would change much while it fits as well.
+
+        This concerns fits of sliders; other fits are returned unchanged.
+        """
         return self
 
     @cached_property
     def at_bounds(self) -> tuple[str, ...]:
-        """Sentences on parameters that ended at a bound of the search, one on all with the same explanation."""
+        """Sentences on parameters that ended at a bound of the search, one for all with the same explanation."""
         low, high = self.bounds
         found: dict[tuple[str, str], list[tuple[str, str]]] = {}
         for i, one in enumerate(self.space.unknowns):
@@ -257,11 +263,11 @@ class Fitted(ReadOnly):
         return tuple(said)
 
     def _beyond(self, which: int) -> bool:
-        """True if an unknown would go beyond a bound where it ended by more than noise tells."""
+        """True if the data would move an unknown beyond its bound by more than noise explains."""
         return True
 
     def _between_samples(self, one: Unknown) -> bool:
-        """True for times that samples bound on both sides, so that an end there says nothing."""
+        """True for times between two samples, for which an end at a bound has no meaning."""
         return False
 
     def _beyond_window(self, one: Unknown, when: str) -> str:

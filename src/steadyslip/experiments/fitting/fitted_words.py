@@ -1,4 +1,4 @@
-"""Text and data that all fits have in common: how good, how sure, and what must be known before use."""
+"""Text and data common to all fits: quality of the fit, errors, and warnings."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from steadyslip.experiments.fitting.search import MIN_ARRIVED
 from steadyslip.experiments.numerics.noise import STRUCTURE
 
 WIDTH = 100  # characters of a line of text
-LEAST_CHANCE = 1e-99  # probabilities below it are not told apart
+LEAST_CHANCE = 1e-99  # smaller probabilities are printed as "below"
 
 
 def quality(fit: Fitted) -> list[str]:
-    """Lines on whiteness, errors and the minimum."""
+    """Lines of text on whiteness, errors and the minimum."""
     search = fit.search
     independent = "residuals taken as correlated" if fit.correlated else "residuals taken as independent"
     reached = f"{search.arrived} of {search.starts} starts lead here"
     enough = min(MIN_ARRIVED, search.starts)
     reached += (
         f", {enough} are enough" if not search.is_chance
-        else f", fewer than {enough}: there may be a better one, look with more (starts)"
+        else f", fewer than {enough}: there may be a better minimum, search with more (starts)"
     )  # fmt: skip
     if search.others:
         reached += f"; {len(search.others)} other minima, the next {search.others[0]:.4g} times as bad"
@@ -45,46 +45,46 @@ def _whiteness(fit: Fitted) -> str:
 
 
 def chance(p: float) -> str:
-    """Format a probability."""
+    """Probability as text."""
     return f"{p:.2g}" if p > LEAST_CHANCE else f"below {LEAST_CHANCE:g}"
 
 
 def fitted_warnings(fit: Fitted) -> list[str]:
-    """Warnings on what the search left open, each a sentence."""
+    """Warnings on undetermined parameters and on the search for the minimum, each a sentence."""
     found = [str(one) for one in fit.unidentified]
     if fit.search.cut:
         found.append(_cut_off(fit))
     elif not fit.search.converged and fit.search.is_chance:
         found.append(
             f"{fit.search.arrived} of {fit.search.starts} starts lead to this minimum, and structure is left in the "
-            "residuals: there may be a better one, so that the numbers have no errors; look with more (starts), or fit "
-            "another model"
+            "residuals: there may be a better minimum, so that the numbers have no errors; search with more (starts), "
+            "or fit another model"
         )
     elif not fit.search.converged:
-        found.append("the search had not come to its end: the numbers are rough, and have no errors")
+        found.append("the search was stopped before it ended: the numbers are rough and have no errors")
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
-        found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
+        found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); compare both")
     return found + (list(fit.at_bounds) if fit.search.converged else [])
 
 
 def _cut_off(fit: Fitted) -> str:
-    """Warning that the search spent its budget, as it does where the model cannot follow the records well."""
-    rough = "" if fit.search.converged else ", not even at its minimum, so that it has no errors"
+    """Warning that the search reached its limit of work, as happens if the model cannot follow the records well."""
+    rough = "" if fit.search.converged else " (not even at a minimum, so that there are no errors)"
     return (
-        f"the search ended when all the work that it may be was done; this is the best that it found{rough}, and there "
-        "may be better; most often the model is not that of the experiment; otherwise let it search longer (effort)"
+        f"the search ended at its limit of work; this is the best fit found{rough}, and there may be a better one; "
+        "most often the model does not suit the experiment; otherwise let it search longer (effort)"
     )
 
 
 def version_warnings(fit: Fitted) -> list[str]:
-    """Warning on a fit that another version made."""
+    """Warning on a fit that was made by another version of steadyslip."""
     other = of_another(fit.version)
-    return [f"{other}; fit anew to compare it with fits of this one"] if other else []
+    return [f"{other}; fit again to compare with fits of this version"] if other else []
 
 
 def estimate_dict(one: Estimate) -> dict[str, Any]:
-    """Data of an estimate; None for what does not exist."""
+    """Data of an estimate for JSON; None for numbers that do not exist."""
     return {
         "value": one.value,
         "error": one.error if one.determined else None,
@@ -96,7 +96,7 @@ def estimate_dict(one: Estimate) -> dict[str, Any]:
 
 
 def fitted_dict(fit: Fitted) -> dict[str, Any]:
-    """Data of a fit for JSON, in SI units; None for what does not exist."""
+    """Data of a fit for JSON, in SI units; None for numbers that do not exist."""
     return {
         "version": fit.version,
         "records": [record.source for record in fit.plan.records],

@@ -1,4 +1,4 @@
-"""Compiled model of an experiment: friction coefficient at the samples and its derivatives in the parameters."""
+"""Compiled model of an experiment: friction coefficient at the samples and its derivatives by the parameters."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ from steadyslip.model.scales import scale_rows
 from steadyslip.motion.engine import run_many
 from steadyslip.motion.jobs import automatic_method
 
-SENSITIVITY_RTOL = 1e-4  # relative error allowed in derivatives: they steer the search, and do not enter its result
+SENSITIVITY_RTOL = 1e-4  # relative tolerance of derivatives, which steer the search but do not enter its result
 SAMPLE_WORK = 0.3  # work of interpolating friction at one sample, in integration steps
 SIZES = (6, 8, 12)  # numbers of directions for which kernels are compiled: few kernels serve all fits
-STEPS_PER_DIRECTION = (
-    0.025  # relative increase of the allowed steps per direction: a richer model must follow what nested ones do
-)
+STEPS_PER_DIRECTION = 0.025
+"""Relative increase of the allowed steps per direction: a model must follow the motions of models nested in it."""
 MIN_STEPS = 100  # steps that every motion may take
-_STEP = 1e-6  # relative step of the central difference, error about 1e-10, used where k follows from other parameters
+_STEP = 1e-6  # relative step of central differences (error about 1e-10) for k if it follows from other parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +40,9 @@ class InputTable:
     times : ndarray (samples,)
         Times at which friction is observed, s, with the zero of the rows.
     node_rates : ndarray (jobs or 1, directions or 0, k)
-        Derivative of the start of each row in each direction.
+        Derivative of the start of each row by each direction (free parameter).
     input_rates : ndarray (jobs or 1, directions or 0, k, 3)
-        Derivatives of the inputs at fixed times in each direction.
+        Derivatives of the inputs at fixed times by each direction.
     """
 
     segments: Array
@@ -95,7 +94,7 @@ def _point_of(rig: Slider, names: tuple[str, ...]) -> OperatingPoint:
 
 
 class Forward:
-    """Compiled model that is run for many sets of parameters at once.
+    """Compiled model of an experiment that runs for many sets of parameters at once.
 
     Parameters
     ----------
@@ -103,13 +102,13 @@ class Forward:
     names : sequence of str
         Full dotted names of the free parameters.
     rtol : float
-        Relative error allowed per step.
+        Relative tolerance of a step.
     shifts : int
         Number of free times of the input table.
     unsettled : sequence of str
-        Initial values, of `ExperimentProgram.unsettled`, that are given; their directions come last.
+        Names, from `ExperimentProgram.unsettled`, of the initial values that are given; their directions come last.
     begins_free : bool
-        True if these are free, so that they have directions.
+        True if these initial values are free, so that there are derivatives by them.
     sensitive : bool
         True to compute derivatives.
     observed : str, optional
@@ -144,7 +143,7 @@ class Forward:
 
     @cached_property
     def _unit_directions(self) -> Array:
-        """Matrix (directions, parameters and initial values) of 1 where a direction is one of them, else 0."""
+        """Matrix (directions, parameters and initial values) with 1 where a direction is one of these, else 0."""
         order = {name: i for i, name in enumerate(self.model.parameters)}
         begins = {name: len(order) + i for i, name in enumerate(self.program.unsettled)}
         found = np.zeros((-(-self.directions // max(self.size, 1)) * self.size, len(order) + len(begins)))
@@ -158,7 +157,7 @@ class Forward:
         return found
 
     def _chain_rule(self, parameters: Array, units: Array) -> Array:
-        """Derivatives (jobs, directions, parameters and initial values) in the free ones; zero in unused directions."""
+        """Derivatives (jobs, directions, parameters and initial values) of these by the free ones; 0 if unused."""
         chain = np.tile(self._unit_directions, (len(parameters), 1, 1))
         if not self.directions:
             return chain
@@ -189,15 +188,15 @@ class Forward:
             Table with as many free times as `shifts`.
         parameters : ndarray (jobs, names)
         units : ndarray (jobs, names)
-                Change of each parameter per unit of the coordinate in which derivatives are taken.
-            begin : ndarray (jobs, unsettled), optional
-                Initial differences from steady sliding.
+            Change of each parameter per unit of the coordinate by which derivatives are taken.
+        begin : ndarray (jobs, unsettled), optional
+            Initial differences from steady sliding.
 
         Returns
         -------
         ndarray (jobs, 1 + directions, samples)
-            Friction, then its derivatives; NaN from where a motion cannot be continued, or where there is no
-            steady sliding to start from.
+            Friction, then its derivatives; NaN from where a motion cannot be continued, or if there is no steady
+            sliding to start from.
         """
         table = table.with_inputs(len(self.program.reduction.channels))
         values = self.values(parameters)
@@ -235,7 +234,7 @@ class Forward:
         if len(found) <= LANES:
             work(0, len(found))
         elif not run_many(work, len(found), self.effort.threads, LANES, lanes=LANES):
-            raise KeyboardInterrupt  # the runs that are missing must not count as failed ones
+            raise KeyboardInterrupt  # missing runs must not count as failed
         self.effort.budget.spend(np.sum(taken, axis=1) + SAMPLE_WORK * len(table.times), 1 + chain.shape[1])
         if self.effort.growth < np.inf:
             ended = np.sum(taken[np.isfinite(found[:, 0, -1])], axis=1)

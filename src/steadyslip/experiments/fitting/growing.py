@@ -1,8 +1,8 @@
-"""Ends of a search that grows with the record: its beginning is fitted first, then more of it, change by change.
+"""Search with a growing part of the record: its beginning is fitted first, then more of it, change by change.
 
-One change of the rate tells a, b, d_c and the stiffness nearly apart from the memory of normal stress, and over a
-short time the model is far less nonlinear: wrong minima, in which one of several changes is followed and the others are
-not, are no minima of the beginning alone.
+One change of the rate determines a, b, d_c and the stiffness nearly independently of the memory of normal stress, and
+over a short time the model is far less nonlinear. A wrong minimum of the whole record, in which the model follows only
+one of several changes, is not a minimum for the beginning alone.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
-KEPT = 4  # different ends of one stage from which the next begins: the eight lanes take two sizes of a memory of each
-SHARES = (0.05, 0.75)  # range of a memory of normal stress that is tried: what laboratories find and half more
+KEPT = 4  # end points of one stage that start the next: each with two sizes of the memory fills the eight SIMD lanes
+SHARES = (0.05, 0.75)  # range of the memory's share that is tried: the range found in laboratories and half more
 
 
 def grown(
     plan: Plan, begin: Array, low: Array, high: Array, effort: Effort, options: Mapping[str, Any]
 ) -> Minima:  # fmt: skip
-    """Ends, on all samples of a plan, of starts (m, p) that follow the first change of its records, then more of them.
+    """End points for the whole records of a plan, of searches from `begin` (m, p) that fit more and more changes.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def grown(
     low, high : ndarray (p,)
     effort : Effort
     options : mapping of str to object
-        Of `minimise`.
+        Further arguments of `minimise`.
     """
     space, count, ends = plan.space(), len(begin), Minima.none(len(low))
     for own in (*_beginnings(plan), plan):
@@ -50,7 +50,7 @@ def grown(
 
 
 def several_changes(plan: Plan) -> bool:
-    """True if a record has a change of normal stress that acts, and other changes besides."""
+    """True if a record has a change of normal stress that drives the contact, and other changes."""
     return plan.follows and plan.pressed and any(
         record.stress_changes and len(loading.changes) > 1
         for record, loading in zip(plan.records, plan.loading, strict=True)
@@ -58,7 +58,7 @@ def several_changes(plan: Plan) -> bool:
 
 
 def stress_alone(plan: Plan) -> bool:
-    """True if the normal stress changes in a record and drives the contact, and the rate of no record changes."""
+    """True if the normal stress changes in a record and drives the contact, while the rate changes in no record."""
     steady = all(channel != "load" for loading in plan.loading for channel, *_ in loading.changes)
     return steady and plan.pressed and any(record.stress_changes for record in plan.records)
 
@@ -73,7 +73,7 @@ def _beginnings(plan: Plan) -> Iterator[Plan]:
 
 
 def _until(record: Record, changes: list[float], count: int) -> Record:
-    """A record up to where the change after so many may begin."""
+    """Record up to the earliest begin of the change that follows the first `count` changes."""
     later = sorted(changes)[count:]
     rows = np.flatnonzero(record.time <= later[0]) if later else np.arange(len(record))
     return record.taken(rows, "its beginning") if len(rows) < len(record) else record

@@ -21,10 +21,10 @@ from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import inputs_at
 from steadyslip.protocol.segments import Segments, pack
 
-MIN_RATE_STEP = 0.05  # least change of ln(velocity) that counts as a step; smaller ones are within measuring errors
+MIN_RATE_STEP = 0.05  # least change of ln(velocity) that counts as a step; smaller changes are measuring errors
 ROWS_PER_PERIOD = 300  # rows per period of a sine wave; straight lines deviate from it by 6e-5 of its amplitude
 MAX_JUMPS = 20  # largest number of jumps whose times are fitted
-_SHIFT = 1e-3  # step of the central difference in free times, s; any would do, as the table is linear in them
+_SHIFT = 1e-3  # step (s) of central differences by free times; any step would do, as tables are linear in them
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Sharp:
 
 
 def sharp_changes(record: Record) -> Sharp:
-    """Find sudden changes of a record, which straight lines between samples would smear.
+    """Sudden changes of a record, which straight lines between samples would smear.
 
     A change counts if it is much larger than those before and after it. The time of a kink of the displacement follows
     from the lines on both sides; the time of a jump does not, and is fitted.
@@ -144,7 +144,7 @@ class MeasuredInputs:
     sharp : Sharp
         Sudden changes of the record.
     pressed : ndarray (n,), optional
-        Change of the normal stress since the first sample, Pa, where it drives the model.
+        Change of the normal stress since the first sample, Pa, if it drives the model.
     """
 
     def __init__(self, record: Record, sharp: Sharp, pressed: Array | None = None) -> None:
@@ -161,7 +161,7 @@ class MeasuredInputs:
         order = np.argsort(moments, kind="stable")
         places = np.array(cuts, dtype=int)[order]
         nodes = np.insert(time, places + 1, np.array(moments, dtype=float)[order]) - self.origin
-        samples = np.insert(np.arange(len(time)), places + 1, -1)  # at the nodes; -1 for none
+        samples = np.insert(np.arange(len(time)), places + 1, -1)  # sample at each node; -1 for none
         old = np.maximum.accumulate(np.where(samples >= 0, samples, 0))[:-1]  # interval of each row
         rows = np.zeros((1, len(nodes) - 1, 9))
         rows[0, :, 0], rows[0, :, 1] = nodes[:-1], nodes[1:]

@@ -1,4 +1,4 @@
-"""Warnings on the loading of a fit: what a displacement cannot show, units, stiffness beside a calibration."""
+"""Warnings on the loading of a fit: doubtful displacements, units, and a stiffness that contradicts a calibration."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 from steadyslip.protocol.protocol import LOAD_POINT
 
-_RIGID = 1e3  # times the machine's stiffness, beyond which a spring takes a thousandth of its stretch: of no account
+_RIGID = 1e3  # a spring behind the sensor is negligible from this multiple of the machine's stiffness
 PART_OF_PRESS = 5.0
-"""Times the machine's stiffness beyond which a sensor is not taken to be across the fault: springs found behind sensors
-across it were .8 to 2 times as stiff, the two that noise of the load point's made 8 and 32 times."""
+"""A sensor is across the fault if the spring behind it is less stiff than this multiple of the machine. Springs found
+for sensors across the fault were .8 to 2 times as stiff; two that were due to noise were 8 and 32 times as stiff."""
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
-OTHER_UNIT = 20.0  # times the calibrated stiffness: lags and servos make it up to 2 times, units 1000 times
-CALIBRATED = 0.1  # relative difference of a stiffness from a calibration, which is no better, that is not told
-WAVY = 4.0  # times its noise from sample to sample by which a displacement wanders, from which waves are told
-MOST_FAULTS = 10  # slips and glitches of a sensor beyond which waves are told; the most of real records had 5
-LISTED = 4  # changes listed in a warning
+OTHER_UNIT = 20.0  # ratio to the calibrated stiffness from which a unit is wrong: lags and servos change it by 2
+CALIBRATED = 0.1  # smaller relative differences from a calibration are not reported: calibrations are no better
+WAVY = 4.0  # waves are reported if a displacement wanders by this multiple of its sample-to-sample noise
+MOST_FAULTS = 10  # waves are also reported above this number of slips and glitches; real records had up to 5
+LISTED = 4  # most changes listed in a warning
 
 
 def loading_warnings(fit: FitNumbers) -> list[str]:
@@ -56,9 +56,9 @@ def _loading_outliers(fit: FitNumbers) -> list[str]:
             if sides:
                 cure = ", and let its beginning be free (initial = 'free')" if course.early else ""
                 found.append(
-                    f"{record.source}: of the {channel}, {enumerated(sides)} samples are off what is found in the "
-                    "others, too few to tell a change from a fault of the sensor; the model does not follow them; "
-                    f"where the loading did change there, cut that off (between){cure}"
+                    f"{record.source}: of the {channel}, {enumerated(sides)} samples are off the loading found in the "
+                    "others, too few to distinguish a change from a fault of the sensor; the model does not follow "
+                    f"them; if the loading did change there, cut them off (between){cure}"
                 )
     return found
 
@@ -68,8 +68,8 @@ def _assumed_rate(fit: FitNumbers) -> list[str]:
     if fit.plan.protocol is None or any(record.displacement is not None for record in fit.plan.records):
         return []
     return [
-        f"no record has a displacement of the load point: it is taken to move at {own_rate(fit)} (drive.velocity) "
-        "until the protocol changes that; if it moved at another rate, every number above is off"
+        f"no record has a displacement of the load point: it is assumed to move at {own_rate(fit)} (drive.velocity) "
+        "until the protocol changes that; if it moved at another rate, every number above is wrong"
     ]
 
 
@@ -103,19 +103,20 @@ def _across_fault(fit: FitNumbers) -> list[str]:
         )  # fmt: skip
         found.append(
             f"{record.source}: the displacement falls where friction rises, {seen} "
-            f"{format_quantity(stress / behind.lost, 'Pa/m')}: rates were found without what that takes, but it cannot "
-            "show how a servo follows; give the rates that were commanded as a protocol, or add shear stress over that "
-            "stiffness where it is known"
+            f"{format_quantity(stress / behind.lost, 'Pa/m')}: its stretch was removed before rates were found, but "
+            "the displacement cannot show how a servo follows; give the commanded rates as a protocol, or, if the "
+            "stiffness is known, add shear stress over stiffness to the displacement"
         )
     return found
 
 
 def _waves(fit: FitNumbers) -> list[str]:
-    """Warnings on displacements that wander about their lines by much more than noise, and not as slow noise does."""
+    """Warnings on displacements that deviate from straight lines by much more than noise, also slow noise, explains."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading if fit.plan.follows else (), strict=False):
         found += [
-            f"{record.source}: {note}, as one of its sensor; if the load point moves so, drive = 'smoothed' follows it"
+            f"{record.source}: {note}, as an error of its sensor; if the load point moves like this, drive = "
+            "'smoothed' follows it"
             for note in record.notes
             if WAVE in note
         ]
@@ -127,7 +128,7 @@ def _waves(fit: FitNumbers) -> list[str]:
         wavy = wavy and whiteness([moved - load.integral(record.time)]).p < STRUCTURE
         if not (many or wavy):
             continue
-        if yielding(record.time, moved, record.friction, load) is not None:  # told already
+        if yielding(record.time, moved, record.friction, load) is not None:  # reported by another warning
             continue
         late = ", the lag of a servo" if any(one.lag for one in load.changes) else ""
         size = format_quantity(load.strays, "m", 2)
@@ -139,13 +140,13 @@ def _waves(fit: FitNumbers) -> list[str]:
         found.append(
             f"{record.source}: the displacement {seen}: a wavy sensor, or a load point that does not keep its rate; "
             f"rates{late} and times of changes found in it may be off by more than their errors; give the "
-            "rates that were commanded as a protocol, or, if the load point moves so, drive = 'smoothed'"
+            "commanded rates as a protocol, or, if the load point moves like this, drive = 'smoothed'"
         )
     return found
 
 
 def _small_changes(fit: FitNumbers) -> list[str]:
-    """Warnings on changes of rate too small to be commanded, as a wavy sensor shows them."""
+    """Warnings on changes of rate that are too small to be commanded and may be waviness of the sensor."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
         changes = () if loading.load is None else loading.load.changes
@@ -154,8 +155,8 @@ def _small_changes(fit: FitNumbers) -> list[str]:
             sizes = [f"{format_percent(one.after / one.before - 1)} at {one.time:.5g} s" for one in small[:LISTED]]
             more = [f"{len(small) - LISTED} more"] if len(small) > LISTED else []
             found.append(
-                f"{record.source}: changes of rate by {enumerated(sizes + more)} are perhaps none but waviness of the "
-                "sensor; where they were not commanded, give the rates that were as a protocol"
+                f"{record.source}: changes of rate by {enumerated(sizes + more)} are perhaps only waviness of the "
+                "sensor; if they were not commanded, give the commanded rates as a protocol"
             )
     return found
 
@@ -180,12 +181,12 @@ def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
     return (
         f"{record.source}: the load point is measured to {format_quantity(noise, 'm')} only, which moves the model by "
         f"{moved:.2g} "
-        "in friction; that makes the stiffness come out too low; leave drive at 'commanded'"
+        "in friction; that makes the fitted stiffness too low; leave drive at 'commanded'"
     )
 
 
 def _off_calibration(fit: FitNumbers) -> list[str]:
-    """Warning on a fitted stiffness that differs from the calibrated one by more than both are uncertain."""
+    """Warnings on a fitted stiffness that differs from the calibrated one by more than their uncertainty."""
     far = [
         one for one in fit.derived
         if one.name.startswith("k/k_cal") and not (one.low <= 1 <= one.high) and abs(one.value - 1) > CALIBRATED
@@ -194,10 +195,10 @@ def _off_calibration(fit: FitNumbers) -> list[str]:
     for one in far:
         if 1 / OTHER_UNIT < one.value < OTHER_UNIT:
             late = "late or a servo that lags" if one.value < 1 else "early or a servo that overshoots"
-            why = f"a channel that comes {late} may make that (lag = true); where the calibration holds, name the "
+            why = f"a channel that comes {late} may be the cause (lag = true); if the calibration is right, name the "
             why += "stiffness in fixed"
         else:
-            why = "by so much a column or the calibration is in another unit (um and mm, MPa and Pa)"
+            why = "a column or the calibration is probably in another unit (um and mm, MPa and Pa)"
         _, at, which = one.name.partition("@")
         where = f" of {fit.plan.records[int(which) - 1].source}" if at and which.isdigit() else ""
         found.append(f"the fitted stiffness{where} is {one.value:.3g} of the calibrated one ({one.range()}): {why}")
@@ -205,7 +206,7 @@ def _off_calibration(fit: FitNumbers) -> list[str]:
 
 
 def _unusual_distances(fit: FitNumbers) -> list[str]:
-    """Warning on slip distances that no rock has, as they come out where a displacement is in another unit."""
+    """Warning on slip distances that no rock has, which a displacement in a wrong unit may cause."""
     distances = fit.plan.rig.of_kind("slip distance")
     found = {name: size for name, size in fit.values.items() if name.partition("@")[0] in distances}
     low, high = USUAL_DISTANCES
@@ -213,9 +214,9 @@ def _unusual_distances(fit: FitNumbers) -> list[str]:
     if not odd:
         return []
     usual = f"{format_quantity(low, 'm')} to {format_quantity(high, 'm')}"
-    return [f"{enumerated(odd)}: laboratories find {usual}; is the displacement in the unit that its column says?"]
+    return [f"{enumerated(odd)}: laboratories find {usual}; is the displacement in the unit named in its column?"]
 
 
 def own_rate(fit: FitNumbers) -> str:
-    """Rate at which the rig itself is driven, as printed."""
+    """Velocity of the rig's drive, as text."""
     return format_quantity(float(operating_point(fit.plan.rig).drive), "m/s")

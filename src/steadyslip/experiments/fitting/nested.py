@@ -1,8 +1,8 @@
-"""Nested models: a fit of the richer model must not end with a larger sum of squares than they reach.
+"""Models nested in the model of a fit, whose sum of squares must not be larger than theirs.
 
-A parameter that declares a value at which it has no effect (`Parameter.idle`) makes the model without it a special
-case of the model with it. Where such a nested model comes near the best fit it is fitted too, exactly as a fit of its
-own would be, and the richer model starts from its minimum.
+A parameter may declare a value at which it has no effect (`Parameter.idle`); the model without it is then a special
+case of the model with it. If such a nested model comes near the best fit, it is fitted too, exactly as in a separate
+fit, and the richer model starts from its minimum.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SCALE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # multiples of a similar scale
 
 @dataclass(frozen=True)
 class NestedModel:
-    """Nested model, with the parameters that only the richer model has.
+    """Nested model, with the further parameters of the richer model.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class NestedModel:
     idle : dict of str to float
         Further parameters of the richer model, by name, with the values at which they have no effect.
     scales : tuple of str
-        Further parameters that have no effect while those are idle, such as the slip distance of a state.
+        Further parameters that have no effect while the `idle` ones have none, such as the slip distance of a state.
     """
 
     plan: Plan
@@ -39,7 +39,7 @@ class NestedModel:
     scales: tuple[str, ...]
 
     def missing(self, space: Space) -> tuple[Array, Array]:
-        """Mask (p,) of the richer model's coordinates that the nested one lacks, and their idle values (p,)."""
+        """Mask (p,) of the richer model's coordinates that the nested model lacks, and their idle values (p,)."""
         held, at = np.zeros(len(space), dtype=bool), np.zeros(len(space))
         for i, one in enumerate(space.unknowns):
             held[i] = one.parameter in self.idle or one.parameter in self.scales
@@ -48,7 +48,7 @@ class NestedModel:
         return held, at
 
     def points_in(self, space: Space, coordinates: Array, low: Array, high: Array) -> Array:
-        """Points (m, p) of the richer model for coordinates of the nested one; m values of undetermined scales."""
+        """Points (m, p) of the richer model for coordinates of the nested one, with m values of undetermined scales."""
         known = dict(zip([one.name for one in self.plan.space().unknowns], coordinates, strict=True))
         _, at = self.missing(space)
         own = np.array([known.get(one.name, at[i]) for i, one in enumerate(space.unknowns)])
@@ -61,7 +61,7 @@ class NestedModel:
 
 
 def nested_models(plan: Plan) -> Iterator[NestedModel]:
-    """Nested models: without the last trend term, free initial state, offset, last state of a law, or part of it."""
+    """Models without the last trend term, the free initial state, the offset, the last state, or a part of the law."""
     if plan.trend:
         yield NestedModel(replace(plan, trend=plan.trend - 1), {f"trend.{plan.trend}": 0.0}, ())
     if plan.initial == "free":
@@ -100,7 +100,7 @@ def _without(plan: Plan, rig: Slider, names: list[str]) -> Plan:
 
 
 def _shorter(rig: Slider, family: str) -> Slider:
-    """The rig without the last member of a list, such as ``friction.states``."""
+    """Rig without the last member of a list, such as ``friction.states``."""
     part, _, field = family.partition(".")
     law = getattr(rig, part)
     return replace(rig, **{part: replace(law, **{field: getattr(law, field)[:-1]})})

@@ -40,7 +40,7 @@ from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
 
 FRICTION_SIZE = 0.01  # natural size of an initial difference of friction from steady sliding
-TRIAL_RTOL = 1e-6  # relative error per step in trials: of friction about 1e-8, far below the scatter of any record
+TRIAL_RTOL = 1e-6  # tolerance of a step in trial fits: about 1e-8 of friction, far below the scatter of any record
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Plan:
     free : tuple of str
         Full names of the free parameters of the rig, and of free times ``protocol.pieces.1.at``.
     separate : tuple of str
-        Free parameters that have a value of their own in every record.
+        Free parameters that have a separate value in every record.
     drive : str
         Loading of the model: ``commanded`` (found in the record), its displacement ``smoothed`` or as ``measured``, or
         the ``protocol``.
@@ -68,7 +68,7 @@ class Plan:
     offset : bool
         True to add a constant to friction, besides mu_ref.
     lag : bool
-        True if friction may lag its loading, in each record by a time of its own.
+        True if friction may lag its loading, by a time that is fitted for each record.
     initial : str
         ``steady`` if the motion begins with steady sliding, ``free`` if its initial friction and states are fitted.
     loss : str
@@ -76,16 +76,16 @@ class Plan:
         Residual from which outliers have less weight.
     weights : tuple of ndarray or None
         One array (n,) for each record; equal weights if None.
-        calibrated : float or None
-            Stiffness of the machine, Pa/m, to which the fitted one is compared.
-        rtol : float
-            Relative error allowed per step of the model.
-        sharp : tuple of Sharp
-            Sudden changes of each record, if the loading is as measured.
+    calibrated : float or None
+        Stiffness of the machine from a calibration, Pa/m, for comparison with the fitted one.
+    rtol : float
+        Relative tolerance of an integration step of the model.
+    sharp : tuple of Sharp
+        Sudden changes of each record, if the loading is as measured.
     loading : tuple of Loading
         Commanded loading found in the columns of each record.
     beginnings : tuple of Beginning
-        How far each record begins from steady sliding, where that is known; empty otherwise.
+        Initial difference of each record from steady sliding, if it is known; empty otherwise.
     """
 
     rig: Slider
@@ -138,11 +138,11 @@ class Plan:
         return Space(tuple(found))
 
     def for_trial(self) -> Plan:
-        """The same plan for short fits beside another."""
+        """Plan with a larger integration tolerance, for short trial fits."""
         return replace(self, rtol=max(self.rtol, TRIAL_RTOL))
 
     def beginning(self, i: int) -> Beginning:
-        """What is known of how record `i` begins, for the memories that the law has; nothing if it is not given."""
+        """Known initial difference of record `i` from steady sliding, for the memories of the law; empty if unknown."""
         return self.beginnings[i].of(self.initial_sizes) if self.beginnings else Beginning({})
 
     def rests(self, i: int) -> bool:
@@ -166,7 +166,7 @@ class Plan:
         return unknown(self.rig.parameters()[name], record)
 
     def comparison(self, effort: Effort | None = None, given: Collection[str] = ()) -> Comparison:
-        """Comparison of the records with the compiled model, without derivatives in the durations named in `given`."""
+        """Comparison of the records with the compiled model; without derivatives by the durations named in `given`."""
         space, effort = self.space(), effort or Effort()
         parts = tuple(self._part(i, record, space, effort, given) for i, record in enumerate(self.records))
         return Comparison(parts, space, self.loss, self.width or 1.0)
@@ -246,7 +246,7 @@ def _pressed_with(rig: Slider, stress: float) -> Slider:
 
 
 def with_loading(plan: Plan) -> Plan:
-    """Plan with the loading of its records, found once: it could not be found in thinned records."""
+    """Plan with the loading of its records, which is found now because thinned records do not show it."""
     if plan.drive == "measured":
         drivers = (record if plan.pressed else replace(record, normal=None) for record in plan.records)
         return replace(plan, sharp=tuple(sharp_changes(driver) for driver in drivers), loading=())
@@ -261,5 +261,5 @@ def with_loading(plan: Plan) -> Plan:
 
 
 def with_lag(plan: Plan) -> Plan:
-    """Plan in which friction may lag its loading, with a time in each record that the lag is counted from."""
+    """Plan in which friction may lag its loading; in each record, one change has a known time as reference."""
     return replace(plan, lag=True, loading=tuple(map(with_reference, plan.loading)))

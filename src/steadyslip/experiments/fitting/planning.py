@@ -1,4 +1,4 @@
-"""Make the plan of a fit from the arguments of a user; one error lists everything that is wrong.
+"""Plan of a fit from the user's arguments; one error lists everything that is wrong with them.
 
 Records are checked before the search; errors say what to change.
 """
@@ -34,7 +34,7 @@ from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import LOAD_POINT
 
 MAX_SAMPLES, AVERAGED_SAMPLES = 40_000, 8_000
-"""Samples above which a record is averaged, and number of means then; chosen by trial, to save time."""
+"""A record with more samples is averaged to about this number of means, to save time; chosen by trial."""
 NEVER_FREE = ("drive.velocity", "slider.area")
 
 
@@ -42,12 +42,12 @@ def make_plan(
     rig: Slider, records: Any, free: Sequence[str] | None = None, *, fixed: Sequence[str] = (),
     separate: Sequence[str] = (), protocol: Any = None, beginnings: tuple[Beginning, ...] = (), **options: Any,
 ) -> Plan:  # fmt: skip
-    """Make a plan from the arguments of `steadyslip.fit`, and the `beginnings` of records where these are known.
+    """Plan from the arguments of `steadyslip.fit`, and from the `beginnings` of records if these are known.
 
     Raises
     ------
     ParameterError
-        Listing everything that is wrong.
+        If arguments or records are wrong; lists all faults.
     """
     many = tuple(records) if isinstance(records, (list, tuple)) else (records,)
     if not many or not all(isinstance(record, Record) for record in many):
@@ -63,13 +63,13 @@ def make_plan(
     problems: list[Problem] = []
     known = can_be_free(rig, plan_protocol)
     names = _default_free(rig) if free is None else resolved("free", free, known, problems)
-    if free is not None:  # the level of friction is never known beforehand: it is free even if not named
+    if free is not None:  # the level of friction is never known in advance: it is free even if not named
         names = [*names, *(name for name in rig.of_kind("friction level") if name in known and name not in names)]
     held = resolved("fixed", fixed, rig.parameters(), problems)
     names = [name for name in dict.fromkeys(names) if name not in held]
     apart = resolved("separate", separate, dict.fromkeys(names), problems)
     problems += faults({name: value for name, value in options.items() if name != "weights"})
-    for name in ("errors", "starts", "effort"):  # options of the search, which are no part of the plan
+    for name in ("errors", "starts", "effort"):  # options of the search are not part of the plan
         options.pop(name, None)
     if not names and not problems:
         problems.append(Problem("free", f"nothing is free; name parameters such as {', '.join(list(known)[:3])}"))
@@ -82,7 +82,7 @@ def make_plan(
         many = tuple(without_wave(record) for record in many)
     if weights is None:
         many = tuple(without_clipped(record) for record in many)
-        if options.get("loss", "linear") == "linear":  # in other losses wild samples weigh little
+        if options.get("loss", "linear") == "linear":  # with other losses, wild samples have little weight
             many = tuple(without_wild(record) for record in many)
         many, options["weights"] = _averaged(many)
     if options.get("calibrated") is not None:
@@ -98,7 +98,7 @@ def make_plan(
 
 
 def _driven_as_recorded(rig: Slider, records: Sequence[Record]) -> Slider:
-    """Rig with a drive's velocity that nobody gave taken from the first record that shows it."""
+    """Rig whose drive velocity, if it is a placeholder, is replaced by that of the first record that has one."""
     if not isinstance(rig.drive.velocity, Placeholder):
         return rig
     rate = next((rate for record in records if (rate := record.initial_rate or 0.0) > 0), None)
@@ -131,7 +131,7 @@ def _default_free(rig: Slider) -> list[str]:
 
 
 def resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> list[str]:
-    """Full names of those in `known`; a problem with each other one is added, under the name `what`."""
+    """Full names, as in `known`, of parameters; adds a problem on the option `what` for each unknown name."""
     if isinstance(names, str):
         names = [names]
     found = []
@@ -147,7 +147,7 @@ def resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> list
 
 
 def _averaged(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Array, ...] | None]:
-    """Records, long ones averaged, and weights of the means; None if no sample is a mean."""
+    """Records, of which long ones are averaged, and weights of their samples (None if no sample is a mean)."""
     handy = tuple(r if len(r) <= MAX_SAMPLES else r.decimated(AVERAGED_SAMPLES) for r in records)
     if all(record.worth is None for record in handy):
         return handy, None
@@ -176,7 +176,7 @@ def with_width(plan: Plan, residuals: Array) -> Plan:
 
 
 def check_friction(records: Iterable[Record]) -> None:
-    """Raise ParameterError for records whose friction is constant: the column is probably not that of friction."""
+    """Raise ParameterError for records with constant friction: their column probably holds something else."""
     problems = [
         Problem("record", f"{record.source}: friction is {record.friction[0]:.6g} in all samples; is it its column?")
         for record in records
@@ -215,14 +215,14 @@ def check_records(plan: Plan) -> None:
             problems.append(Problem("drive.velocity", message))
         if plan.protocol is not None and not drives and record.displacement is not None:
             problems.append(Problem("protocol", "does not move the load point, but the record does; leave it "
-                                    "away, or give it a velocity-step, hold or velocity-table"))  # fmt: skip
+                                    "out, or give it a velocity-step, hold or velocity-table"))  # fmt: skip
         if plan.protocol is not None and record.time[0] < 0:
             problems.append(
                 Problem(where, f"{record.source} starts at {record.time[0]:.6g} s, before the protocol's 0 s")
             )
         for k, other in enumerate(plan.records[: i - 1], start=1):
             if is_same_measurement(record, other):
-                again = f"is record {k} again ({record.source}), whole, cut or averaged; an experiment counts once"
+                again = f"is record {k} again ({record.source}), whole, cut or averaged; give each experiment once"
                 problems.append(Problem(where, again))
         needed = len(plan.free) + plan.trend + plan.offset + (plan.initial == "free")
         if len(record) <= needed:
@@ -244,8 +244,8 @@ def check_changes(plan: Plan) -> None:
         problems.append(
             Problem("record" if len(plan.records) == 1 else f"record {i + 1}",
                     f"{record.source}: no change of the load point's rate or the normal stress was found, and steady "
-                    "sliding that nothing disturbs tells the level of friction alone; allowed: a record with a change, "
-                    "the experiment's protocol, or initial = 'free' where sliding is not steady at first")
+                    "sliding that nothing disturbs determines only the level of friction; allowed: a record with a "
+                    "change, the experiment's protocol, or initial = 'free' if sliding is not steady at first")
         )  # fmt: skip
     raise ParameterError(problems)
 

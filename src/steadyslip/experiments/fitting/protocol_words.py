@@ -1,4 +1,4 @@
-"""Test of a protocol that was given against the displacement of the load point that was measured."""
+"""Comparison of a given protocol with the measured displacement of the load point."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from steadyslip.experiments.loading.across import yielding
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.numerics.splitting import displacement_noise, line, spread
 
-RATE_SHARE = 0.02  # difference of rates, as a share of the larger, that is told: calibrations agree to a percent or so
-BEYOND = 5.0  # standard deviations beyond which a difference is not noise of the sensor
-FEWEST = 8  # samples that show a rate
-SETTLED = 0.3  # first share of the time at a rate that is left out: a servo arrives there
+RATE_SHARE = 0.02  # least relative difference of rates that is reported: calibrations agree to a percent or so
+BEYOND = 5.0  # a difference of more standard deviations is not noise of the sensor
+FEWEST = 8  # least number of samples that show a rate
+SETTLED = 0.3  # share of the time at a rate that is ignored at first, while a servo settles
 
 
 @dataclass(frozen=True)
 class _Stretch:
-    """Time at one rate of a protocol: samples settled there, rate, and what was measured less what was commanded.
+    """Part of a protocol at one rate, with a straight line through the measured minus the commanded displacement.
 
-    `offset` (m) and `excess` (m/s) are the level and the slope of that difference, `noise` (m) its scatter.
+    `count` is the number of settled samples; `offset` (m) and `excess` (m/s) are the mean and the slope of the line,
+    `noise` (m) is the scatter about it.
     """
 
     begin: float
@@ -38,12 +39,12 @@ class _Stretch:
 
 
 def protocol_against_record(part: Any, times: Array) -> str:
-    """Sentence on where a protocol and the measured displacement of a record contradict each other; empty for nowhere.
+    """Sentence on where a protocol contradicts the measured displacement of a record; empty if nowhere.
 
     Parameters
     ----------
     part : RecordPart
-        A record driven by a protocol.
+        Record with its model, which a protocol drives.
     times : ndarray (free,)
         Values of the protocol's free times, s.
     """
@@ -62,15 +63,15 @@ def protocol_against_record(part: Any, times: Array) -> str:
         )
     course = record.loading.load
     if course is not None and yielding(record.time, record.displacement, record.friction, course) is not None:
-        return ""  # across the fault: it tells no times of the load point
+        return ""  # measured across the fault: it does not show when the load point moved
     return _late(record.source, stretches, course)
 
 
-_CURE = "mend that, or leave the protocol away, so that the displacement drives the fit"
+_CURE = "correct it, or leave the protocol out, so that the displacement drives the fit"
 
 
 def _late(source: str, stretches: list[_Stretch], course: Course | None) -> str:
-    """Sentence on a change of rate that came earlier or later than the protocol has it."""
+    """Sentence on a change of rate that was earlier or later than in the protocol; empty if there is none."""
     for before, after in pairwise(stretches):
         behind = before.offset - after.offset
         noise = max(before.noise, after.noise)
@@ -94,7 +95,7 @@ def _late(source: str, stretches: list[_Stretch], course: Course | None) -> str:
 
 
 def _stretches(time: Array, displacement: Array, rows: Array) -> list[_Stretch]:
-    """Times at constant rates of a protocol, from rows of its input table, with what was measured there."""
+    """Parts of a protocol at constant rates, from its input table, compared with the measured displacement."""
     rows = rows[rows[:, 1] > rows[:, 0]]
     begins, rates, slopes = rows[:, 0], rows[:, 3], rows[:, 6]
     spans = rows[:, 1] - begins

@@ -1,4 +1,4 @@
-"""Variants of a fit: minima that are reached if its loading is changed."""
+"""Variants of a fit: minima for other assumptions about the loading."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, Minima, minimise
 
-RAMP_SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # durations of ramps that are tried, as shares of the longest
+RAMP_SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # durations of trial ramps, as shares of the longest possible
 
 
 @dataclass(frozen=True)
 class RampFit:
-    """Minimum with ramps in place of steps, all of one share of their longest possible durations.
+    """Minimum with ramps in place of steps.
 
     Attributes
     ----------
     share : float
-        Duration of each ramp as a share of its longest.
+        Duration of each ramp as a share of its longest possible duration.
     ssq : float
         Sum of squares.
     values : dict of str to float
@@ -39,7 +39,7 @@ class RampFit:
 def driven_as_measured(
     plan: Plan, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, float] | None:
-    """Values, by name, that a fit reaches from its minimum if the measured columns drive the model; None if none.
+    """Values, by name, at the minimum near that of a fit if measured columns drive the model; None if there is none.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def driven_as_measured(
 
 
 def _minimised(plan: Plan, z: Array, low: Array, high: Array, given: Collection[str] = (), **options: Any) -> Minima:
-    """Minima from starting points z (m, p), with durations `given` in each, within the work of one search."""
+    """Minima from starting points z (m, p) with held durations named in `given`, within the work of one search."""
     samples = sum(len(record) for record in plan.records)
     allowance = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
     comparison = plan.for_trial().comparison(Effort(budget=budget), given)
@@ -73,16 +73,16 @@ def _minimised(plan: Plan, z: Array, low: Array, high: Array, given: Collection[
 
 
 def may_be_ramp(channel: str, change: Change) -> bool:
-    """True if a change is taken as a step although a ramp would fit the displacement as well."""
+    """True if a change is modelled as a step although a ramp would fit the displacement as well."""
     return channel == "load" and change.free and change.duration == 0 and change.longest > 0 and not change.slight
 
 
 def with_ramps(
     plan: Plan, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], wanted: float
 ) -> tuple[RampFit, ...]:
-    """Minima with ramps in place of steps that may be ramps, the shortest first; empty if there are none.
+    """Minima with ramps in place of steps that may be ramps, the shortest ramps first; empty if there are none.
 
-    Parameters are those of `driven_as_measured`, and the sum of squares `wanted`: searches that will not get there end
+    Parameters are those of `driven_as_measured`, and the sum of squares `wanted`: searches that will not reach it end
     early. Several durations are tried, as shares of the longest possible ones; the middle of a ramp stays within the
     window of the step.
     """
@@ -94,7 +94,7 @@ def with_ramps(
     lows, highs = (np.tile(ends, (len(RAMP_SHARES), 1)) for ends in (low, high))
     begin = np.array([[values.get(u.name, share * u.high) for u in space.unknowns] for share in RAMP_SHARES])
     lengths = [k for k, u in enumerate(space.unknowns) if u.name not in values]
-    for k in lengths:  # the unknown before a duration is when its ramp begins
+    for k in lengths:  # the unknown before a duration is the begin of the ramp
         earlier = 0.5 * begin[:, k : k + 1]
         begin[:, k - 1 : k] -= earlier
         for ends in (lows, highs):

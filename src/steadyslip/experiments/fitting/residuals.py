@@ -11,9 +11,9 @@ from steadyslip.core.checks import Check, check
 from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.numerics.noise import Noise
 
-SSQ_TOLERANCE = 1e-6  # relative difference of sums of squares; ten times the accuracy to which the search converges
+SSQ_TOLERANCE = 1e-6  # relative tolerance for sums of squares: ten times that to which the search converges
 PIECES, MIN_SAMPLES = 16, 4  # pieces of a record whose means are compared, and least number of samples in each
-MAX_EXCESS = 1.0  # relative excess of the scatter over the expected one; chance reaches it once in twenty million fits
+MAX_EXCESS = 1.0  # largest relative excess of the scatter over that of noise; by chance once in twenty million fits
 
 
 def residual_checks(fit: Fitted) -> tuple[Check, ...]:

@@ -36,21 +36,21 @@ class Fit(FitNumbers):  # noqa: D101 -- its base has it
         return residual_checks(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data in SI units, as ``--json`` prints it; numbers that do not exist are None."""
+        """Convert to a dict of JSON-ready data in SI units, as printed by ``--json``; None for missing numbers."""
         return as_dict(self)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write everything, the records included, to a netCDF file; `load_fit` reads it back."""
+        """Write the fit and its records to a netCDF file; `load_fit` reads it back."""
         store.save(self, path)
 
     def plot(self, kind: str = "fit", ax: Any = None) -> Any:
-        """Draw the fit.
+        """Plot the fit.
 
         Parameters
         ----------
         kind : str
-            ``fit`` (what drives it, record and model, residuals and their autocorrelation), ``steps`` (each step on
-            its own) or ``corner`` (estimates against each other).
+            ``fit`` (loading, record with model, residuals and their autocorrelation), ``steps`` (each step separately)
+            or ``corner`` (estimates against each other).
         ax : array of matplotlib Axes, optional
 
         Returns
@@ -64,12 +64,12 @@ class Fit(FitNumbers):  # noqa: D101 -- its base has it
 def load_fit(path: str | PathLike[str]) -> Fit | MachineFit:
     """Read a fit that `Fit.save` or `MachineFit.save` wrote.
 
-    Nothing in the file is executed; damage is found, whatever it is.
+    Nothing in the file is executed, and any damage is detected.
 
     Raises
     ------
     NotAvailable
-        If the file is not one of ours, is damaged, or cannot be read.
+        If the file was not written by one of these, is damaged, or cannot be read.
 
     Examples
     --------
@@ -85,12 +85,12 @@ def load_fit(path: str | PathLike[str]) -> Fit | MachineFit:
 
 
 def load_friction_fit(path: str | PathLike[str]) -> Fit:
-    """Read a fit of friction, as `load_fit`.
+    """Fit of a slider's friction, read as by `load_fit`.
 
     Raises
     ------
     NotAvailable
-        If the file holds the fit of a machine, or as `load_fit`.
+        If the file contains the fit of a machine, is damaged, or cannot be read.
     """
     found = load_fit(path)
     if not isinstance(found, Fit):

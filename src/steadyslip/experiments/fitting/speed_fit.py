@@ -21,17 +21,22 @@ from steadyslip.experiments.numerics.profiled import ProfiledMinimum, intervals,
 from steadyslip.laws.friction.law import FrictionLaw
 
 LEVELS = (0.6827, 0.95)
-"""Probabilities of the intervals: one standard deviation of a normal error, and the usual one."""
+"""Probabilities of the intervals: that of one standard deviation of a normal error, and 95 %."""
 HELD = ("exponent", "viscosity")
-"""Kinds of parameters that are held, in this order, where rows are few: at their standing value, or at 0."""
-SAME = 1e-6  # relative difference of speeds or loads that count as one
+"""Kinds of parameters that are held, in this order, if rows are few: at their default value, or else at 0."""
+SAME = 1e-6  # speeds or loads with a smaller relative difference count as equal
 
 
 @dataclass(frozen=True)
 class SpeedEstimate(Estimate):
-    """Parameter of a steady friction curve; `likely` is the 68 % interval, `remark` says what the table does not tell.
+    """Parameter of a steady friction curve with its error, which is half the width of the 68 % interval.
 
-    The error is half the width of the 68 % interval, inf where that has no end.
+    Attributes
+    ----------
+    likely : tuple of float
+        68 % interval.
+    remark : str
+        Text on what the table does not determine; empty if there is nothing.
     """
 
     likely: tuple[float, float] = (float("nan"), float("nan"))
@@ -40,23 +45,23 @@ class SpeedEstimate(Estimate):
 
 @dataclass(frozen=True, eq=False)
 class DirectionFit(ReadOnly):
-    """Steady friction in one direction.
+    """Fit of a friction law to the steady friction in one direction.
 
     Attributes
     ----------
     forward : bool
     estimates : tuple of SpeedEstimate
-        With load: friction coefficients and values per load. Without: forces (torques) and the like.
+        If the table has a load: friction coefficients and values per load. Otherwise: forces (torques) and the like.
     law : FrictionLaw
-        With the estimates; what a table cannot tell has a value from `UNTOLD`'s middle.
+        Law with the estimates; parameters that a table does not determine have default values.
     load : float
-        N, the median of the table; 1 where it has none, so that coefficients are forces.
+        Median load of the table, N; 1 without a load, so that coefficients are forces.
     speed, friction, fitted : ndarray (n,)
         m/s (rad/s), N (N m) or coefficients.
     scatter : float
-        Standard deviation of friction about the curve: a share of it, or N (N m) with absolute errors.
+        Standard deviation of friction about the curve: a share of friction, or N (N m) with absolute errors.
     freedom : int
-        Rows less parameters.
+        Number of rows minus number of parameters.
     correlation : ndarray (p, p)
     notes : tuple of str
     """
@@ -74,26 +79,26 @@ class DirectionFit(ReadOnly):
     notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> SpeedEstimate:
-        """Estimate by name."""
+        """Estimate of a parameter by its name."""
         found = {one.name: one for one in self.estimates}
         if name not in found:
             raise KeyError(unknown_name("estimate", name, found))
         return found[name]
 
-    def beside(self, name: str) -> float:
-        """Value of an estimate beside the law, 0 where it is not one."""
+    def further(self, name: str) -> float:
+        """Value of an estimate in addition to the law (internal preload, damping); 0 if it was not fitted."""
         return {one.name: one.value for one in self.estimates}.get(name, 0.0)
 
 
 def fit_direction(
     table: SpeedTable, law: type[FrictionLaw], forward: bool, held: Mapping[str, float], relative: bool
 ) -> DirectionFit:
-    """Fit one direction of a table.
+    """Fit to the rows of one direction of a table.
 
     Raises
     ------
     NotAvailable
-        If it has too few speeds for the law.
+        If the direction has too few speeds for the law.
     """
     rows = (table.speed > 0) == forward
     speed, friction = np.abs(table.speed[rows]), table.friction[rows]
@@ -121,7 +126,7 @@ def fit_direction(
 
 
 def _with(law: FrictionLaw, values: Mapping[str, float]) -> FrictionLaw:
-    """Law with values, checked by its constructor."""
+    """Law with some new values, which its constructor checks."""
     every = {item.name: getattr(law, item.name) for item in fields(law)} | dict(values)
     return type(law)(**every)
 
@@ -138,7 +143,7 @@ def _chosen(
     held: Mapping[str, float],
     forward: bool,
 ) -> tuple[SteadyCurve, list[str]]:
-    """Curve with as many free parameters as the rows can tell, and notes on what is held."""
+    """Curve with as many free parameters as the rows determine, and notes on parameters that are held."""
     notes: list[str] = []
     reference = float(np.exp(np.mean(np.log(speed))))
     speeds, fixed = _distinct(speed), dict(held)
@@ -152,10 +157,10 @@ def _chosen(
     for name in droppable:
         if len(curve.free) > speeds or len(curve.free) + len(more) >= len(speed):
             value = fixed[name] = curve.roles[name].standing or 0.0
-            notes.append(f"{name} is held at {value:g}: {rows} do not tell it as well")
+            notes.append(f"{name} is held at {value:g}: {rows} are too few to determine it too")
             curve = steady_curve(law, reference, fixed, ())
     while more and len(curve.free) + len(more) >= len(speed):
-        notes.append(f"{more.pop()} is left out: {len(speed)} rows do not tell it as well")
+        notes.append(f"{more.pop()} is left out: {len(speed)} rows are too few to determine it too")
     if len(curve.free) > speeds or len(curve.free) >= len(speed):
         way = "forward" if forward else "backward"
         raise NotAvailable(
@@ -192,15 +197,15 @@ def _estimate(
         which = "" if open_below and open_above else " from below" if open_below else " from above"
         remark = "; ".join(filter(None, [remark, f"not determined{which} by these speeds"]))
     return SpeedEstimate(
-        name, float(value), error, unit_told(role, table, bool(curve.logarithmic[i])), float(low), float(high),
+        name, float(value), error, unit_of(role, table, bool(curve.logarithmic[i])), float(low), float(high),
         likely=(float(low68), float(high68)), remark=remark,
     )  # fmt: skip
 
 
-def unit_told(role: Parameter, table: SpeedTable, bent: bool) -> str:
-    """SI unit in which a table tells a parameter: forces where it has no load, angles where it turns.
+def unit_of(role: Parameter, table: SpeedTable, bent: bool) -> str:
+    """SI unit of a parameter for a table: in forces if it has no load, in angles if its speeds are angular.
 
-    `bent` is true for what friction does not rise with in proportion, scales and exponents.
+    `bent` is true for parameters with which friction does not rise in proportion (scales and exponents).
     """
     shown = role.unit
     if shown == "N":  # a load
@@ -215,7 +220,7 @@ def unit_told(role: Parameter, table: SpeedTable, bent: bool) -> str:
 
 @dataclass(frozen=True, eq=False)
 class SpeedFindings(ReadOnly):
-    """Friction of a table of speeds as a law, forward and backward apart.
+    """Fits of a friction law to a table of speeds, separately forward and backward.
 
     Attributes
     ----------
@@ -223,11 +228,11 @@ class SpeedFindings(ReadOnly):
     law : str
         Name of the law.
     forward, backward : DirectionFit or None
-        None where the table has no such speeds.
+        None if the table has no speeds in that direction.
     bristles : BristleStiffness or None
-        From a loop before sliding, if one was given.
+        Stiffness from a loop before sliding, if a loop was given.
     relative : bool
-        True if the errors of friction are shares of it.
+        True if errors are in proportion to friction.
     """
 
     table: SpeedTable = field(repr=False)
@@ -239,7 +244,7 @@ class SpeedFindings(ReadOnly):
 
     @property
     def main(self) -> DirectionFit:
-        """The forward fit, or the backward one where there is no other."""
+        """Fit of the forward direction, or of the backward direction if there is no other."""
         if (found := self.forward or self.backward) is None:
             raise InternalError("a fit of a table without rows")
         return found
@@ -249,13 +254,13 @@ class SpeedFindings(ReadOnly):
         return self.main[name]
 
 
-FEWEST_ROWS = 5  # a loop goes one way and back; two rows each and one where it turns
-LEAST_RISE = 1e-3  # of the displacements, as a share of the largest step: smaller ones say nothing on stiffness
+FEWEST_ROWS = 5  # least number of rows of a loop: two forward, two back, and the turning point
+LEAST_RISE = 1e-3  # steps of displacement below this share of the largest do not count for the stiffness
 
 
 @dataclass(frozen=True)
 class BristleStiffness:
-    """Stiffness of bristles with its intervals, N/m (N m/rad where the loop turns).
+    """Stiffness of bristles with its intervals, N/m (N m/rad for a rotation).
 
     Attributes
     ----------
@@ -263,7 +268,7 @@ class BristleStiffness:
     low, high : float
         Ends of the 95 % interval.
     breakaway : float
-        Force at which the bristles would slip, as the loop bends towards it; N.
+        Force at which the bristles would slip, extrapolated from the curvature of the loop; N.
     scatter : float
         Standard deviation of the forces about the loop, N.
     """
@@ -277,9 +282,10 @@ class BristleStiffness:
 
 
 def loop_forces(displacement: Array, stiffness: float, breakaway: float, first: float) -> tuple[Array, Array]:
-    """Forces (n,) of LuGre bristles over displacement (n,), m, and derivatives (n, 3) by ln K, ln F_S and the first.
+    """Forces (n,) of LuGre bristles at displacements (n,), and derivatives (n, 3) by ln K, ln F_S and the first force.
 
-    Slow bristles obey dF/dx = K (1 − F sign(dx)/F_S): between turns the force goes exponentially towards ±F_S.
+    At low speed dF/dx = K (1 − F sign(dx)/F_S) with stiffness K and breakaway force F_S: between turning points the
+    force approaches ±F_S exponentially.
     """
     force, slopes = np.empty(len(displacement)), np.empty((len(displacement), 3))
     now, by = first, np.array([0.0, 0.0, 1.0])
@@ -294,7 +300,7 @@ def loop_forces(displacement: Array, stiffness: float, breakaway: float, first: 
 
 
 def fit_loop(loop: PreslidingLoop) -> BristleStiffness:
-    """Stiffness of bristles from a loop, with errors from the scatter of its forces.
+    """Stiffness of bristles from a loop of force over displacement, with errors from the scatter of its forces.
 
     Raises
     ------
@@ -322,7 +328,7 @@ def fit_loop(loop: PreslidingLoop) -> BristleStiffness:
     starts = [np.array([math.log(slope * k), math.log(size * s), f[0]]) for k in (1, 3) for s in (1.02, 1.5)]
     found, ends = intervals(least(residuals, starts, low, high), LEVELS)
     if not np.all(np.isfinite(ends[0])):
-        raise NotAvailable(f"the loop {loop.source!r} does not tell a stiffness: its forces do not follow displacement")
+        raise NotAvailable(f"no stiffness follows from the loop {loop.source!r}: its forces do not follow displacement")
     (low68, high68), (low95, high95) = np.exp(ends[0])
     return BristleStiffness(
         float(np.exp(found.at[0])), float(high68 - low68) / 2, float(low95), float(high95),

@@ -1,4 +1,4 @@
-"""Result of a fit to a table of speeds: numbers, text, the fitted rig and its file."""
+"""Result of a fit to a table of speeds, with its text, data and rig file."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from steadyslip.core.version import stamped
 from steadyslip.core.written import display_units
 from steadyslip.experiments.fitting.load_dependence import (
     dependence,
-    dragged_beside,
-    how_to_give_it,
-    pressed_beside,
+    internal_preload,
+    load_comments,
+    load_free_drag,
     summary,
 )
 from steadyslip.experiments.fitting.speed_fit import DirectionFit, SpeedEstimate, SpeedFindings
-from steadyslip.experiments.fitting.steady_curve import UNTOLD
+from steadyslip.experiments.fitting.steady_curve import ONLY_COMBINED
 from steadyslip.files.specifications.layout import UNKNOWN
 
 BRISTLES, BRISTLE_DAMPING, SLIP = "bristle stiffness", "bristle damping", "slip distance"
 DEFLECTION = (1e-6, 1e-5, 1e-4)
-"""Least, usual and largest deflection of bristles before they slip, or slip distance, m: guides and seals give way by
-1 to 50 um (Armstrong-Helouvry 1991). Of joints, some 10 cm from their axis, ten times as many rad."""
-RAD_A_METRE = 10.0  # rad/m, of joints: see above
+"""Smallest, usual and largest deflection of bristles before they slip, or slip distance, m: guides and seals yield by
+1 to 50 um (Armstrong-Helouvry 1991)."""
+RAD_A_METRE = 10.0  # rad per m of deflection in joints, whose contact is some 10 cm from the axis
 STIFFNESS, MASS, SHAFT, INERTIA = (
     "20 N/um",
     100.0,
@@ -39,15 +39,15 @@ STIFFNESS, MASS, SHAFT, INERTIA = (
 )  # of a common axis, of a common joint; kg, kg m^2
 COEFFICIENT_LOAD = 1000.0  # N, where a table of coefficients has no load
 SHARES = ("exponent", "stress share", "immediate share")
-"""Kinds of parameters without unit that are no force per load."""
-CHANGE = "CHANGE: a table of speeds does not tell it"
+"""Kinds of dimensionless parameters that are not a force per load."""
+CHANGE = "CHANGE: a table of speeds does not determine it"
 
 
-def untold(found: SpeedFindings) -> dict[str, tuple[float, float, float]]:
-    """Least, usual and largest value of parameters of the law that a table of speeds does not tell, in law units."""
+def undetermined(found: SpeedFindings) -> dict[str, tuple[float, float, float]]:
+    """Smallest, usual and largest value, in units of the law, of parameters not determined by a table of speeds."""
     one, turns = found.main, found.table.turns
     load = rig_load(found)
-    level = float(one.fitted.max()) / (1.0 if found.table.is_coefficient else one.load + pressed_beside(one))
+    level = float(one.fitted.max()) / (1.0 if found.table.is_coefficient else one.load + internal_preload(one))
     turned = 1 / found.table.radius if found.table.radius else RAD_A_METRE
     short, usual, long = (length * (turned if turns else 1.0) for length in DEFLECTION)
     ranges: dict[str, tuple[float, float, float]] = {}
@@ -68,21 +68,21 @@ def untold(found: SpeedFindings) -> dict[str, tuple[float, float, float]]:
 
 
 def rig_load(found: SpeedFindings) -> float:
-    """Load (N) of the rig: the table's median, one of many of coefficients, or 1 for forces without a load."""
+    """Load (N) of the rig: median of the table, `COEFFICIENT_LOAD` for coefficients, or 1 for forces without a load."""
     if found.table.load is None and found.table.is_coefficient:
         return COEFFICIENT_LOAD
     return found.main.load
 
 
 def rig_text(found: SpeedFindings) -> str:
-    """A complete rig file: a slider, or a machine of one body where the table turns."""
+    """Text of a complete rig file: a slider, or a machine of one rotating body for a table of torques."""
     with display_units([found.table.speed_unit]):
-        return _text(found, untold(found))
+        return _text(found, undetermined(found))
 
 
 def _text(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> str:
     lines = [f"# Friction of {found.table.source}: steadyslip fit --law {found.law}."]
-    lines += ["# Lines with CHANGE are not told by a table of speeds: give those of your machine."]
+    lines += ["# Lines with CHANGE do not follow from a table of speeds: write the values of your machine."]
     if found.table.load is None and not found.table.is_coefficient:
         turned = found.table.turns and found.table.radius is None
         what = "torques in N m" if turned else "forces in N"
@@ -101,13 +101,13 @@ def _text(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -
 
 def _axis(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> list[str]:
     one = found.main
-    offset, damping = pressed_beside(one), dragged_beside(one)
+    offset, damping = internal_preload(one), load_free_drag(one)
     slowest = one.speed.min() / unit(found.table.speed_unit)[0]
     drag = [f'radiation_damping = "{damping:.6g} N s/m"  # viscous drag that does not follow the load']
     return [
         *_friction(found, ranges, "friction"), "", "[contact]", 'law = "constant"',
-        _preload(found) + (f", with {format_quantity(offset, 'N')} that presses beside the load" if offset else ""),
-        *how_to_give_it(found, 1.0), "",
+        _preload(found) + (f", plus an internal preload of {format_quantity(offset, 'N')}" if offset else ""),
+        *load_comments(found, 1.0), "",
         "[slider]", 'area = "1 m^2"  # so that forces and stresses have the same numbers',
         f'stiffness = "{STIFFNESS}"  # {CHANGE}', f'mass = "{MASS:g} kg"  # {CHANGE}',
         *(drag if damping else []), "", "[drive]",
@@ -119,7 +119,7 @@ _RADIUS = {
     False: "so that m/s are rad/s, and N are N m: the table's torques, whatever the real radius",
     True: "CHANGE: at a radius of 0.1 m a tenth of v_stribeck and ten times viscous and bristles belong to it",
 }
-"""Comments on the radius of a table of torques, and of one of coefficients, that was not given."""
+"""Comments on a radius that was not given: for a table of torques (False), or of coefficients (True)."""
 AT_ONE_METRE = (
     "The rig file has the friction at a radius of 1 m, where m/s are rad/s and N are N m; for that of your contact "
     'give radius, --set radius="40 mm".'
@@ -127,12 +127,12 @@ AT_ONE_METRE = (
 
 
 def _lever(found: SpeedFindings) -> float:
-    """Load (N) of the rig over that of the table, which may be a torque that presses at a radius."""
+    """Load (N) of the rig over the load of the table, which may be a torque."""
     return 1 / (found.table.radius or 1.0) if found.table.load_turns else 1.0
 
 
 def _at_radius(found: SpeedFindings, si_unit: str, kind: str) -> float:
-    """Factor of a parameter of the law from a radius of 1 m, at which rad/s are m/s, to that of the contact."""
+    """Factor that converts a parameter of the law from a radius of 1 m, where rad/s are m/s, to that of the contact."""
     table = found.table
     if not table.turns or table.radius is None:
         return 1.0
@@ -143,7 +143,7 @@ def _at_radius(found: SpeedFindings, si_unit: str, kind: str) -> float:
 def _joint(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) -> list[str]:
     one, where = found.main, "contacts.bearing"
     slowest = one.speed.min() / unit(found.table.speed_unit)[0]
-    damping = dragged_beside(one)
+    damping = load_free_drag(one)
     drag = [
         "[links.drag]",
         'kind = "shaft"',
@@ -157,7 +157,7 @@ def _joint(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]]) 
         *(drag if damping else []), f"[{where}]", 'body = "joint"',
         _radius(found), "",
         *_friction(found, ranges, f"{where}.friction"), "",
-        f"[{where}.contact]", 'law = "constant"', _preload(found), *how_to_give_it(found, _lever(found)), "", "[drive]",
+        f"[{where}.contact]", 'law = "constant"', _preload(found), *load_comments(found, _lever(found)), "", "[drive]",
         'control = "rotary-steady"',
         f'velocity = "{slowest:.6g} {found.table.speed_unit}"  # CHANGE: the slowest speed of the table',
     ]  # fmt: skip
@@ -176,7 +176,7 @@ def _preload(found: SpeedFindings) -> str:
         if found.table.is_coefficient
         else "the table has none"
     )
-    load = _lever(found) * (rig_load(found) + pressed_beside(found.main))
+    load = _lever(found) * (rig_load(found) + internal_preload(found.main))
     return f'preload = "{load:.6g} N"  # {told}'
 
 
@@ -194,7 +194,7 @@ def _friction(found: SpeedFindings, ranges: dict[str, tuple[float, float, float]
             )
             lines.append(f"{name} = {_written(found, name, ranges[name][1])}  # {source}")
         elif address.value is not None and address.value != _default(found.main.law, name):
-            said = "held, not fitted" if address.role.kind not in UNTOLD else "only what it makes with others is told"
+            said = "held, not fitted" if address.role.kind not in ONLY_COMBINED else "determined only with others"
             lines.append(f"{name} = {_written(found, name, address.value)}  # {said}")
     if found.forward is not None and found.backward is not None:
         lines.append("# backward:")
@@ -233,11 +233,11 @@ def _written(found: SpeedFindings, name: str, value: float) -> str:
     return f'"{value:.8g} {own}"'
 
 
-MOST_SCATTER = 1.0  # share of the friction from which the law is told not to follow it: as wrong as none at all
+MOST_SCATTER = 1.0  # a law with a larger scatter, as a share of friction, does not describe the rows
 
 
 def _scattered(found: SpeedFindings) -> list[str]:
-    """Questions about directions whose scatter exceeds their friction."""
+    """Questions to the user about directions in which the scatter exceeds the friction."""
     sides = [one for one in (found.forward, found.backward) if one is not None]
     shares = [one.scatter / (1.0 if found.relative else float(np.median(one.friction))) for one in sides]
     return [
@@ -248,11 +248,11 @@ def _scattered(found: SpeedFindings) -> list[str]:
     ]
 
 
-CLOSE = 0.95  # correlation from which two parameters are told to stand for each other
+CLOSE = 0.95  # pairs of parameters are listed from this correlation of their errors
 
 
 def words(found: SpeedFindings) -> str:
-    """Whole text of a fit, about 100 columns wide."""
+    """Text of a fit to a table of speeds, about 100 columns wide."""
     table = found.table
     lines = [f"Friction of {table.source} as the law {found.law}"]
     lines += [f"  to check: {note}" if note in table.questions else f"  {note}" for note in table.notes]
@@ -273,10 +273,10 @@ def words(found: SpeedFindings) -> str:
             )
         lines.append(f"bristle stiffness {value}{at}, from the loop (95 %: {low} to {high})")
     known = parameters(found.main.law)
-    names = [name for name in untold(found) if found.bristles is None or known[name].role.kind != BRISTLES]
+    names = [name for name in undetermined(found) if found.bristles is None or known[name].role.kind != BRISTLES]
     if names:
-        told = f"The table does not tell {' and '.join(names)}"
-        lines.append(f"{told}: the rig file carries intervals, which analyze answers for.")
+        unknown = f"The table does not determine {' and '.join(names)}"
+        lines.append(f"{unknown}: the rig file has intervals for them, which analyze examines.")
     return "\n".join(lines)
 
 
@@ -307,14 +307,14 @@ def _direction(found: SpeedFindings, one: DirectionFit) -> list[str]:
 
 
 def _difference(one: DirectionFit) -> str | None:
-    """Line on the change of friction with ln v, where the law's direct effect is held."""
+    """Line on the change of friction with ln v, if the direct effect of the law is held; else None."""
     kinds = {address.role.kind: (name, address.value) for name, address in parameters(one.law).items()}
     (a, direct), (b, _) = kinds.get("direct effect", ("", None)), kinds.get("evolution effect", ("", None))
     found = [estimate for estimate in one.estimates if estimate.name == b]
     if direct is None or not found:
         return None
     text = format_with_error(direct - found[0].value, found[0].error, found[0].unit)
-    return f"  {a} - {b} = {text}: the table tells the difference alone; {a} is held at {direct:g}"
+    return f"  {a} - {b} = {text}: the table determines only the difference; {a} is held at {direct:g}"
 
 
 def _shown(one: SpeedEstimate) -> str:
@@ -327,7 +327,7 @@ def _end(value: float, si_unit: str) -> str:
 
 
 def _together(one: DirectionFit) -> list[str]:
-    """Lines on pairs of parameters whose errors go together."""
+    """Line on pairs of parameters with highly correlated errors; empty if there are none."""
     names = [estimate.name for estimate in one.estimates]
     pairs = [
         f"{names[i]} and {names[j]} ({one.correlation[i, j]:+.3f})"
@@ -335,11 +335,11 @@ def _together(one: DirectionFit) -> list[str]:
         for j in range(i)
         if abs(one.correlation[i, j]) >= CLOSE
     ]
-    return [f"  errors go together: {', '.join(pairs)}"] if pairs else []
+    return [f"  correlated errors: {', '.join(pairs)}"] if pairs else []
 
 
 def as_dict(found: SpeedFindings) -> dict[str, Any]:
-    """Plain data of a fit for JSON, SI units; ends that do not exist are None."""
+    """Data of a fit for JSON in SI units; None for ends that do not exist."""
     data: dict[str, Any] = {"source": found.table.source, "law": found.law, "notes": list(found.table.notes)}
     for name, one in (("forward", found.forward), ("backward", found.backward)):
         if one is None:
@@ -370,9 +370,9 @@ class SpeedFit(SpeedFindings):  # noqa: D101 -- its base has it
         return words(self)
 
     def rig_text(self) -> str:
-        """A complete rig file with this friction, in which what the table does not tell is marked."""
+        """Text of a complete rig file with this friction; values that the table does not determine are marked."""
         return rig_text(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, SI units."""
+        """Convert to a dict of JSON-ready data in SI units."""
         return as_dict(self)

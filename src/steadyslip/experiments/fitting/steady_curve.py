@@ -1,4 +1,4 @@
-"""Friction in steady sliding of any law, as a function of speed, load and the parameters that a table can tell."""
+"""Steady friction of any law as a function of speed, load and the parameters that a table of speeds determines."""
 
 from __future__ import annotations
 
@@ -20,30 +20,31 @@ from steadyslip.core.roles import Parameter
 from steadyslip.laws.friction.law import FrictionLaw
 
 OFFSET, DAMPING = "internal_preload", "damping"
-"""Parameters beside those of the law: load that presses without being in the table, and viscous drag beside it."""
-BESIDE = {
-    OFFSET: Parameter("N", real, "load that presses beside that of the table"),
-    DAMPING: Parameter("N s/m", nonnegative, "viscous drag that does not follow the load"),
+"""Parameters in addition to those of the law: a load that is not in the table, and a viscous drag without load."""
+FURTHER = {
+    OFFSET: Parameter("N", real, "load that presses in addition to that of the table"),
+    DAMPING: Parameter("N s/m", nonnegative, "viscous drag that does not depend on the load"),
 }
-UNTOLD = ("direct effect", "reference rate")
-"""Kinds of parameters that steady friction holds only together with others: a beside b, v* beside μ*."""
-FARTHEST = 100.0  # factor beyond the measured speeds at which a velocity scale is looked for
-OFFSETS = 100.0  # bound of the load that presses beside that of the table, in units of its largest
-LARGEST = 100.0  # bound of other parameters, in units of what alone would make the whole friction
-EXPONENTS = (0.1, 10.0)  # bounds of exponents and other parameters that are not scales: a step, a flat curve
-SCALE_STARTS, OTHER_STARTS, SEARCHED = 6, (0.6, 1.2, 2.5), 4  # grid of starts, and how many are searched from
+ONLY_COMBINED = ("direct effect", "reference rate")
+"""Kinds of parameters that steady friction determines only in combination: a with b, v* with μ*."""
+FARTHEST = 100.0  # bounds of a velocity scale: this factor beyond the measured speeds
+OFFSETS = 100.0  # bound of the internal preload, as a multiple of the largest load of the table
+LARGEST = 100.0  # bound of other parameters, as a multiple of the value at which one alone makes the whole friction
+EXPONENTS = (0.1, 10.0)  # bounds of exponents: from a flat curve to a step
+SCALE_STARTS, OTHER_STARTS, SEARCHED = 6, (0.6, 1.2, 2.5), 4
+"""Grid of starting points (number of velocity scales, values of exponents), and number of searches from it."""
 
 
 @dataclass(frozen=True)
 class SteadyCurve:
-    """Steady friction of a law in parameters of which some are searched for as logarithms.
+    """Steady friction of a law as a function of its free parameters, some of which are searched as logarithms.
 
     Attributes
     ----------
     law : FrictionLaw
-        Has the values of everything that is not free.
+        Law with the values of all parameters that are not free.
     free : tuple of str
-        Parameters of the law, then `OFFSET` and `DAMPING` where they are free.
+        Free parameters of the law, then `OFFSET` and `DAMPING` if they are free.
     roles : dict of str to Parameter
     logarithmic : ndarray of bool (p,)
         True for scales and exponents.
@@ -76,7 +77,7 @@ class SteadyCurve:
         return pressed * mu + more.get(DAMPING, 0.0) * speed, np.hstack(columns)
 
     def values(self, inner: Array) -> Array:
-        """Parameters in SI units from the searched ones, whose scales are logarithms."""
+        """Parameters in SI units from the searched ones, some of which are logarithms."""
         return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, inner, 0.0)), inner)
 
     def residuals(self, inner: Array, speed: Array, load: Array, force: Array, relative: bool) -> tuple[Array, Array]:
@@ -91,7 +92,7 @@ class SteadyCurve:
         return np.log(safe / force), np.where(found > floor, 1.0, 0.0)[:, None] * slopes / safe[:, None]
 
     def bounds(self, speed: Array, load: Array, force: Array) -> tuple[Array, Array]:
-        """Bounds of the searched parameters: wide, and what domains forbid is outside."""
+        """Lower and upper bounds of the searched parameters: wide, but within the domains of the parameters."""
         ones = self.values(np.where(self.logarithmic, np.log(float(np.sqrt(speed.min() * speed.max()))), 0.0))
         _, slopes = self.force(ones, speed, load)
         low, high = [], []
@@ -110,7 +111,7 @@ class SteadyCurve:
                 size = LARGEST / steep if steep > 0 else LARGEST
             low.append(-size if role.domain.low < 0 else 0.0 if role.domain.low_allowed else 1e-9 * size)
             high.append(size)
-        if OFFSET in self.free:  # what presses in all stays positive
+        if OFFSET in self.free:  # the total load must stay positive
             low[self.free.index(OFFSET)] = -0.99 * float(load.min())
         return np.array(low), np.array(high)
 
@@ -135,10 +136,10 @@ class SteadyCurve:
         for point in product(*grids):
             inner = np.zeros(len(self.free))
             inner[bent] = point
-            if OFFSET in self.free and not load.min():  # else friction without load has no slope to follow
+            if OFFSET in self.free and not load.min():  # friction at zero load would have zero derivatives
                 inner[self.free.index(OFFSET)] = float(load.max())
             slopes = self.residuals(inner, speed, load, force, False)[1]
-            # at zero of all linear parameters the friction is zero, so that slopes are the whole of it
+            # friction is zero if all linear parameters are zero, so that it follows from the slopes alone
             ends = low[straight], np.maximum(high[straight], low[straight] + 1e-300)
             one = lsq_linear(slopes[:, straight] * weight[:, None], force * weight, ends)
             inner[straight] = one.x
@@ -150,7 +151,7 @@ class SteadyCurve:
 def steady_curve(
     law: type[FrictionLaw], reference: float, held: Mapping[str, float], more: Sequence[str]
 ) -> SteadyCurve:
-    """Steady friction of a law with everything free that a table of speeds can tell.
+    """Steady friction of a law with all parameters free that a table of speeds determines.
 
     Parameters
     ----------
@@ -160,21 +161,21 @@ def steady_curve(
     held : mapping of str to float
         Parameters of the law that are not free.
     more : sequence of str
-        `OFFSET`, `DAMPING`: what is free beside the law.
+        Further free parameters: `OFFSET`, `DAMPING`.
 
     Raises
     ------
     NotAvailable
-        If the law's steady friction has no parameter that could be found.
+        If the law's steady friction has no parameter that a table determines.
     """
     record = _record(law)
     roles = {name: one.role for name, one in parameters(record).items()}
     fixed = {name: reference for name, role in roles.items() if role.kind == "reference rate"} | dict(held)
     own, bent, call = _compiled(law, tuple(fixed))  # type: ignore[arg-type]
     if not own:
-        raise NotAvailable(f"steady friction of the law {law.name!r} has no parameter that a table of speeds tells")
+        raise NotAvailable(f"a table of speeds determines no parameter of the law {law.name!r}")
     return SteadyCurve(
-        with_values(record, fixed), (*own, *more), roles | BESIDE, np.array([*bent, *(False for _ in more)]),
+        with_values(record, fixed), (*own, *more), roles | FURTHER, np.array([*bent, *(False for _ in more)]),
         partial(call, tuple(fixed.values())),
     )  # fmt: skip
 
@@ -185,16 +186,17 @@ def _record(law: type[FrictionLaw]) -> FrictionLaw:
 
 @cache
 def _compiled(law: type[FrictionLaw], fixed: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[bool, ...], Any]:
-    """Free parameters of a law's steady friction, which of them it is not linear in, and the function of it.
+    """Free parameters of a law's steady friction, marks of those it is nonlinear in, and a function that computes it.
 
-    The function takes the fixed values, speeds, and the free ones, and gives friction and its derivatives.
+    The function takes the fixed values, the speeds and the free values, and returns friction and its derivatives.
     """
     record = _record(law)
     v, pressed = sp.Symbol("v", positive=True), sp.Symbol("sigma", positive=True)
     symbols = {
         name: sp.Dummy(name.replace(".", "_"), positive=True)
         for name, one in parameters(record).items()
-        if name in fixed or (one.role.kind not in UNTOLD and (one.value is not None or one.role.standing is not None))
+        if name in fixed
+        or (one.role.kind not in ONLY_COMBINED and (one.value is not None or one.role.standing is not None))
     }
     steady = sp.expand(with_values(record, symbols).steady_strength(v, pressed) / pressed).subs(pressed, 1)
     own = tuple(name for name, symbol in symbols.items() if name not in fixed and steady.has(symbol))

@@ -13,25 +13,25 @@ from steadyslip.core.records import Address
 
 @dataclass(frozen=True)
 class Unknown:
-    """Free parameter with its coordinate: its logarithm, or its value in units of `size`.
+    """Free parameter with the coordinate of its search: the logarithm of its value, or its value in units of `size`.
 
     Attributes
     ----------
     name : str
-        Full dotted name, with ``@2`` behind it where it belongs to the second record alone.
+        Full dotted name, followed by ``@2`` if it belongs to the second record only.
     parameter : str
         Full dotted name in the rig or the protocol.
     unit : str
     record : int or None
-        Index of the record it belongs to; None if all records share it.
-        logarithmic : bool
-            True if the coordinate is the logarithm of the value.
-        size : float
-            Change of the value per unit of a coordinate that is not logarithmic.
-        low, high : float
-            Bounds of the value.
-        kind : str
-            Kind that the law declares; see `steadyslip.core.roles.PARAMETER_KINDS`.
+        Index of the record to which the parameter belongs; None if all records share it.
+    logarithmic : bool
+        True if the coordinate is the logarithm of the value.
+    size : float
+        Change of the value per unit of a coordinate that is not logarithmic.
+    low, high : float
+        Bounds of the value.
+    kind : str
+        Kind that the law declares; see `steadyslip.core.roles.PARAMETER_KINDS`.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Unknown:
 
 
 def unknown(address: Address, record: int | None, scale: float | None = None) -> Unknown:
-    """Make the unknown of a parameter: logarithmic if it must be positive and has no natural size."""
+    """Unknown of a parameter, with a logarithmic coordinate if it must be positive and has no natural size."""
     name, domain = address.name, address.role.domain
     own = f"{name}@{record + 1}" if record is not None else name
     role = address.role
@@ -96,6 +96,6 @@ class Space:
         return np.stack([u.coordinate(values[..., i]) for i, u in enumerate(self.unknowns)], axis=-1)
 
     def slopes(self, coordinates: Array) -> Array:
-        """Derivatives of the values with respect to the coordinates, of their shape."""
+        """Derivatives (..., p) of the values with respect to the coordinates (..., p)."""
         powers = np.exp(np.where(self._logarithmic, coordinates, 0.0))
         return np.where(self._logarithmic, powers, self._sizes)

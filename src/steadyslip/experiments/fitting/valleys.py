@@ -1,9 +1,9 @@
-"""Valleys of the sum of squares that are longer than its curvature at the minimum says.
+"""Errors along valleys of the sum of squares that are longer than its curvature at the minimum suggests.
 
-Where derivatives of the model are nearly dependent, parameters can be exchanged for each other over a range in which
-the model is not linear. The covariance then tells an error along the valley that may be several times too small. So
-the parameter that is most nearly a combination of the others is held away from the minimum, on both sides, and the
-others are fitted again: how far the sum of squares lets it go is its error.
+If derivatives of the model are nearly dependent, parameters can replace each other over a range in which the model is
+not linear. Errors from the covariance may then be several times too small. Therefore the parameter that is most nearly
+a combination of the others is held at distances from the minimum, on both sides, and the others are fitted again: its
+error follows from the rise of the sum of squares.
 """
 
 from __future__ import annotations
@@ -26,20 +26,29 @@ from steadyslip.experiments.fitting.estimates import (
 )
 from steadyslip.experiments.numerics.least_squares import minimise
 
-DEPENDENT = 1e-3  # least eigenvalue of JᵀJ, scaled to a diagonal of 1, of a usual step: .004, of open directions 3e-4
-LEAST_DEVIATION = 0.05  # e-folds or natural sizes: models are linear over less
-OPEN_DISTANCES = (1.0, 2.0, 4.0)  # the same along a direction that is open, in e-folds or natural sizes
+DEPENDENT = 1e-3
+"""Derivatives are nearly dependent below this eigenvalue of JᵀJ, scaled to a diagonal of 1: it is .004 for usual steps
+and 3e-4 along open directions."""
+LEAST_DEVIATION = 0.05  # least standard deviation of a valley (e-folds or natural sizes): models are linear over less
+OPEN_DISTANCES = (1.0, 2.0, 4.0)  # distances along an open direction, in e-folds or natural sizes
 REACH = 1.96  # standard deviations: 95 %
-DISTANCES = (2.0, 4.0, 8.0)  # standard deviations at which the others are fitted again, on both sides
-LEAST_STRETCH = 1.1  # of an error: shorter ones are within what these fits are good for
-MOST_ITERATIONS, TOLERANCE = 30, 1e-4  # of these fits; a rise of the sum of squares is needed to two digits
+DISTANCES = (2.0, 4.0, 8.0)  # distances, in standard deviations, at which the others are fitted again, on both sides
+LEAST_STRETCH = 1.1  # errors are only widened by more than this factor, which is the accuracy of these fits
+MOST_ITERATIONS, TOLERANCE = 30, 1e-4  # limits of these fits: the rise of the sum of squares is needed to two digits
 
 
 @dataclass(frozen=True, eq=False)
 class _Valley:
-    """Coordinate that is held, standard deviations (p,) of all along the valley, and shares (p,) of their variance.
+    """Valley of the sum of squares.
 
-    Shares of times are -1: samples bound them on both sides, whatever the other parameters are.
+    Attributes
+    ----------
+    held : int
+        Index of the coordinate that is held at distances from the minimum.
+    axis : ndarray (p,)
+        Changes of all coordinates by one standard deviation along the valley.
+    share : ndarray (p,)
+        Share of each coordinate's variance that is along the valley; -1 for times, which samples bound on both sides.
     """
 
     held: int
@@ -50,15 +59,15 @@ class _Valley:
 def along_valleys(
     plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], information: Array, covariance: Array
 ) -> tuple[Array, tuple[Combination, ...], Array]:
-    """Covariance (p, p), widened or infinite along a valley, the combination that it leaves open, and places in it.
+    """Covariance (p, p) widened along a valley, combinations of parameters that are undetermined, and points in it.
 
-    The places (m, p) fit as well as the minimum does.
+    The points (m, p) fit as well as the minimum.
 
     Parameters
     ----------
     plan, comparison
     z : ndarray (p,)
-        The minimum.
+        Coordinates of the minimum.
     bounds : tuple of two ndarray (p,)
     information, covariance : ndarray (p, p)
         JᵀJ and the covariance from it.
@@ -86,18 +95,18 @@ def along_open(
     plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], covariance: Array, held: int,
     variance: float,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Covariance (p, p) without errors of what changes along an open direction, in which the model is not linear.
+    """Covariance (p, p), infinite for parameters that change along an open direction, and points (m, p) on it.
 
-    And places (m, p) along it that fit as well as the minimum does.
+    The model is not linear along the direction. The points fit as well as the minimum.
 
     Parameters
     ----------
     plan, comparison, z, bounds, covariance
-        As of `along_valleys`.
+        As for `along_valleys`.
     held : int
-        The parameter that changes most along the direction.
+        Index of the parameter that changes most along the direction.
     variance : float
-        Of the noise, by which the sum of squares rises one standard deviation from the minimum.
+        Variance of the noise: rise of the sum of squares at one standard deviation from the minimum.
     """
     axis = np.zeros(len(z))
     axis[held] = 1.0
@@ -113,7 +122,7 @@ def along_open(
 
 
 def _valley(comparison: DataComparison, information: Array, covariance: Array) -> _Valley | None:
-    """The nearly dependent parameter among those that have an error; None if there is none."""
+    """Valley along which a parameter with a finite error is nearly a combination of others; None if there is none."""
     known = np.flatnonzero(np.isfinite(np.diag(covariance)) & (np.diag(information) > 0))
     times = np.array([is_time(one) for one in comparison.space.unknowns])
     if len(known) < 2 or np.all(times[known]):
@@ -134,7 +143,7 @@ def _valley(comparison: DataComparison, information: Array, covariance: Array) -
 
 
 def _unit_of_rise(information: Array, covariance: Array, i: int) -> float:
-    """Rise of the sum of squares one standard deviation from the minimum, with correlation of the residuals."""
+    """Rise of the sum of squares at one standard deviation of parameter i, for correlated residuals."""
     naive = float(np.linalg.pinv(information, rcond=1e-13, hermitian=True)[i, i])
     return float(covariance[i, i]) / max(naive, 1e-300)
 
@@ -143,9 +152,9 @@ def _reached(
     plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], valley: _Valley, unit: float,
     distances: tuple[float, ...] = DISTANCES,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Standard deviations (p,) that the ends of the valley stand for, on the side where each parameter goes further.
+    """Standard deviations (p,) along the valley, from its longer side for each parameter, and points (m, p) in it.
 
-    And places (m, p) on the way where the sum of squares is not above what 95 % need.
+    The points are within the rise of the sum of squares that corresponds to 95 %.
     """
     away = np.array([side * own for side in (-1.0, 1.0) for own in distances])
     begin = np.clip(z + away[:, None] * valley.axis, *bounds)
@@ -163,9 +172,10 @@ def _reached(
 
 
 def _end(moved: Array, roots: Array) -> Array:
-    """Distances (p,) where the sum of squares has risen by what 95 % need, from distances (m, p) and roots of the rise.
+    """Distances (p,) at which the sum of squares has risen as it should for 95 %, by interpolation.
 
-    Where it does not rise so far, the valley is taken to be twice as long as was tried.
+    `moved` (m, p) are distances and `roots` (m,) the roots of the rise there. If the rise is too small at all of them,
+    the valley is assumed to be twice as long as the largest.
     """
     moved, roots = np.vstack([np.zeros(moved.shape[1]), moved]), np.append(0.0, roots)
     beyond = np.flatnonzero(roots >= REACH)

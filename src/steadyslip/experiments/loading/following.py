@@ -14,7 +14,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.joint import OUTLIER, JointFit, SensorSamples, fit_at_once, fit_servo
 from steadyslip.experiments.loading.loading import is_slight
-from steadyslip.experiments.loading.pieces import fit_pieces, is_beside
+from steadyslip.experiments.loading.pieces import fit_pieces, is_off_at_changes
 from steadyslip.experiments.loading.servo import GAIN, settling
 from steadyslip.experiments.numerics.noise import describe
 
@@ -116,13 +116,13 @@ def followed(
             break
     time, values = (column[~lines.in_glitch(time)] for column in (time, values))
     yield best
-    if not is_beside(time, (values - best.predicted(time)) / noise, lines.meets):
+    if not is_off_at_changes(time, (values - best.predicted(time)) / noise, lines.meets):
         return
     slight = sum(map(is_slight, at_once.rates, at_once.rates[1:]))  # these may be part of the response to others
     for kinks in reversed([one for one in ways if len(lines.meets) - len(one.meets) <= slight]):
         samples = _thinned(time, values, noise, kinks, kinks.far_levels(spacing), spacing)
         best = fit_pieces(samples, fit_at_once(samples, kinks.meets, np.zeros(len(kinks.meets))), spacing)
-        if not is_beside(time, (values - best.predicted(time)) / noise, lines.meets):
+        if not is_off_at_changes(time, (values - best.predicted(time)) / noise, lines.meets):
             break
     yield best.widened(_inflation(best, time, values))
 

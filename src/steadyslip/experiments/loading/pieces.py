@@ -38,7 +38,7 @@ COMPARED, EVEN = 25, 1e-9  # number of smoothing strengths compared, and ratio o
 SINGULAR = 1e-12  # added to the unit diagonal, so that pieces without samples (lost ones) do not make it singular
 
 
-def is_beside(time: Array, off: Array, changes: Array) -> bool:
+def is_off_at_changes(time: Array, off: Array, changes: Array) -> bool:
     """True if a fit fails around changes: means of deviations there exceed their noise and the means far from changes.
 
     Parameters

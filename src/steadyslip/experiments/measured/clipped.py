@@ -48,7 +48,7 @@ def without_wild(record: Record) -> Record:
     """
     if record.loading.load is None or len(record) < 10 * BESIDE:
         return record
-    away, out = _off_those_beside(record.friction)
+    away, out = _off_neighbours(record.friction)
     for channel, _, change in record.loading.changes:
         first, last = np.searchsorted(record.time, [change.earliest, change.latest + change.duration])
         near = slice(max(first - BESIDE, 0), last + AFTER)
@@ -83,7 +83,7 @@ def _without(record: Record, out: Array, why: str) -> Record:
     return replace(record.taken(~out, note), commanded=record.loading)
 
 
-def _off_those_beside(values: Array) -> tuple[Array, Array]:
+def _off_neighbours(values: Array) -> tuple[Array, Array]:
     """Deviation (n,) of each value from the median of its neighbours, and mask (n,) of values that are far off."""
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, BESIDE, mode="reflect"), 2 * BESIDE + 1)
     beside = np.delete(windows, BESIDE, axis=1)

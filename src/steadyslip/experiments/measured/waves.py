@@ -118,10 +118,10 @@ def _fitted(time: Array, moved: Array, course: Course, start: Array) -> tuple[Ar
         base = np.linalg.qr(lines[keep])[0]
 
         def left(parts: Array, base: Array = base, own: Array = moved[keep]) -> Array:
-            return _beside(_place(own, parts), base)
+            return _orthogonal(_place(own, parts), base)
 
         def slopes(parts: Array, base: Array = base, own: Array = moved[keep]) -> Array:
-            return _beside(_place_slopes(_place(own, parts), parts), base)
+            return _orthogonal(_place_slopes(_place(own, parts), parts), base)
 
         scales = np.append(np.full(2, np.hypot(*start[:2])), start[2] ** 2 / np.ptp(moved))
         found = least_squares(left, start, slopes, x_scale=scales, method="lm", max_nfev=STEPS)
@@ -154,7 +154,7 @@ def _place_slopes(place: Array, parts: Array) -> Array:
     return found
 
 
-def _beside(values: Array, base: Array) -> Array:
+def _orthogonal(values: Array, base: Array) -> Array:
     """Part of `values` (n, ...) that is orthogonal to the orthonormal columns of `base` (n, k)."""
     return np.asarray(values - base @ (base.T @ values))
 

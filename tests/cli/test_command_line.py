@@ -154,6 +154,22 @@ def test_no_object_is_left_to_the_last_garbage_collection():
     assert int(done.stdout.splitlines()[-1]) < 1000  # importing the commands alone makes tens of thousands
 
 
+def test_a_command_is_made_alone_and_is_the_same(monkeypatch):
+    from typer.testing import CliRunner
+
+    from steadyslip.cli import program
+
+    programs = []
+    monkeypatch.setattr(program, "end", programs.append)
+    monkeypatch.setattr(program.gc, "set_threshold", lambda most: None)
+    for word in ("analyze", "--help", "analyse"):
+        monkeypatch.setattr(sys, "argv", ["steadyslip", word])
+        program.main()
+    assert [len(one.registered_commands) for one in programs] == [1, len(program.COMMANDS), len(program.COMMANDS)]
+    alone, whole = (CliRunner().invoke(one, ["analyze", "--help"]).output for one in programs[:2])
+    assert alone == whole
+
+
 STICK_SLIP = EXAMPLE.parent / "stick-slip.toml"
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -97,28 +98,38 @@ class _Command(_Converting, TyperCommand):
         return f"{word!r} is a word too many{f'; {advice}' if known else ''}"
 
 
-app = typer.Typer(
-    cls=_Commands,
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    help="Stability of frictional sliding: will it slide steadily, what would make it, how far is the edge.",
-)
-
-
-@app.callback(invoke_without_command=True)
 def _start(version: Annotated[bool, typer.Option("--version", help="print the version and stop")] = False) -> None:
     if version:
         print_text(f"steadyslip {program_version()}")
         raise typer.Exit
 
 
-for command in COMMANDS:
-    app.command(command.__name__.rstrip("_"), cls=_Command)(command)
+def _word(command: Callable[..., None]) -> str:
+    """Word for a command on the command line."""
+    return command.__name__.rstrip("_")
+
+
+def program_of(commands: Iterable[Callable[..., None]]) -> typer.Typer:
+    """Program with the given commands."""
+    program = typer.Typer(
+        cls=_Commands,
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        help="Stability of frictional sliding: will it slide steadily, what would make it, how far is the edge.",
+    )
+    program.callback(invoke_without_command=True)(_start)
+    for command in commands:
+        program.command(_word(command), cls=_Command)(command)
+    return program
+
+
+app = program_of(COMMANDS)
 
 
 def main() -> None:
     """Run the command line and exit; entry point of the package."""
     gc.set_threshold(GARBAGE)
-    end(app)
+    asked = [command for command in COMMANDS if sys.argv[1:2] == [_word(command)]]
+    end(program_of(asked) if asked else app)  # Typer reads the options of all commands, which takes time

@@ -340,16 +340,14 @@ def dop853() -> Method:
     result = np.pad(table.STEP[-1], (0, len(first) - len(table.STEP[-1])))
     first[0], last[len(table.STEP) - 1] = 1.0, 1.0
     terms = [result, first - result, 2 * result - first - last, *np.array(table.DENSE)]
-    theta, rest = np.polynomial.Polynomial([0.0, 1.0]), np.polynomial.Polynomial([1.0, -1.0])
-    rows = []
-    for weights in np.transpose(terms):  # θ (f0 + (1-θ) (f1 + θ (f2 + (1-θ) (...))))
-        value = np.polynomial.Polynomial([0.0])
-        for i, weight in enumerate(reversed(weights)):
-            value = (value + weight) * (rest if i % 2 else theta)
-        rows.append(tuple(float(c) for c in np.pad(value.coef[1:], (0, len(terms) + 1 - len(value.coef)))))
+    dense = np.zeros((len(first), len(terms) + 1))  # polynomials in θ, lowest power first
+    for i, weights in enumerate(reversed(terms)):  # θ (f0 + (1-θ) (f1 + θ (f2 + (1-θ) (...))))
+        dense[:, 0] += weights
+        by_theta = np.roll(dense, 1, axis=1)
+        dense = dense - by_theta if i % 2 else by_theta
     return Method(
         name="dop853", order=8, error_order=5, dense_order=7, a=table.STEP + table.EXTRA, c=(), error=table.ERROR,
-        dense=tuple(rows), lower_error=table.LOWER_ERROR, lower_order=3,
+        dense=tuple(map(tuple, dense[:, 1:].tolist())), lower_error=table.LOWER_ERROR, lower_order=3,
     )  # fmt: skip
 
 

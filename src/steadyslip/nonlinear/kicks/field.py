@@ -62,7 +62,9 @@ def solved_at(rest: Rest, states: Array) -> tuple[Array, Array, Array]:
     with np.errstate(all="ignore"):
         for _ in range(BALANCED if count else 1):
             found = function(*given, *split, *np.moveaxis(unknowns, 2, 0))
-            numbers = np.stack([np.broadcast_to(np.asarray(one, dtype=float), shape) for one in found], axis=2)
+            numbers = np.empty((*shape, len(found)))
+            for i, one in enumerate(found):
+                numbers[..., i] = one
             if count:
                 residuals, slopes = numbers[..., n + speeds : n + speeds + count], numbers[..., n + speeds + count :]
                 change, sensitivity = _newton(residuals, slopes.reshape(*shape, count, count))

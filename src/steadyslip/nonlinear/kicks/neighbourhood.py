@@ -164,11 +164,11 @@ class Neighbourhood:
     def _falls(self, which: Array, q: Array, gradient: Array) -> Array:
         """True (k,) where V falls at all q (k, d, n), by at least `MARGIN` times the linear rate of |q|²."""
         rest = self.rest.part(which)
-        away = np.einsum("kij,kdj->kdi", self.basis[which], q)
+        away = q @ np.swapaxes(self.basis[which], 1, 2)
         rates, velocity = motion_at(rest, rest.state[:, None, :] + rest.scales[:, None, :] * away)
-        linear = np.einsum("kij,kdj->kdi", self.inverse[which] @ rest.matrix @ self.basis[which], q)
+        linear = q @ np.swapaxes(self.inverse[which] @ rest.matrix @ self.basis[which], 1, 2)
         with np.errstate(all="ignore"):
-            back = np.einsum("kij,kdj->kdi", self.inverse[which], rates / rest.scales[:, None, :])
+            back = (rates / rest.scales[:, None, :]) @ np.swapaxes(self.inverse[which], 1, 2)
             slope, bound = np.sum(gradient * back, axis=2), 2 * MARGIN * np.sum(q * linear, axis=2)
             return np.asarray(np.all((slope < bound) & (velocity > 0), axis=1))
 

@@ -12,9 +12,9 @@ decrease of V is therefore checked with the full rates.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import combinations, permutations
-from math import factorial
+from functools import cached_property, lru_cache
+from itertools import combinations, combinations_with_replacement, permutations
+from math import factorial, prod
 
 import numpy as np
 
@@ -62,11 +62,14 @@ class Rays:
     @classmethod
     def along(cls, way: Array, v3: Array, v4: Array) -> Rays:
         """Rays along unit vectors `way` (m, d, n), with the coefficients returned by `terms`."""
-        count, rays, n = way.shape
-        twice = (way[..., :, None] * way[..., None, :]).reshape(count, rays, -1)
-        thrice = (twice[..., :, None] * way[..., None, :]).reshape(count, rays, -1)
-        forms = (3 * v3.reshape(count, n, -1), 4 * v4.reshape(count, n, -1))
-        return cls(way, *(own @ form.swapaxes(1, 2) for own, form in zip((twice, thrice), forms, strict=True)))
+        entries, gradients = np.moveaxis(way, 2, 0), [np.empty_like(way), np.empty_like(way)]
+        for gradient, form in zip(gradients, (v3, v4), strict=True):
+            order = form.ndim - 1
+            places, times = _monomials(way.shape[2], order - 1)
+            for i, own in enumerate(form):  # one rig at a time: all monomials of many rays take 100 MB
+                products = prod(entries[place, i] for place in places)
+                gradient[i] = products.T @ (order * times * own[:, *places]).T
+        return cls(way, *gradients)
 
     def part(self, which: Array) -> Rays:
         """Rays of some of the rigs."""
@@ -109,6 +112,14 @@ class Rays:
             above = self.value(middle) >= level
             low, high = np.where(above, low, middle), np.where(above, middle, high)
         return np.where(met, high, np.nan)
+
+
+@lru_cache(maxsize=8)
+def _monomials(n: int, order: int) -> tuple[tuple[Array, ...], Array]:
+    """Indices of the factors of all monomials of an order in n variables, and how often each stands in a form."""
+    places = np.array(list(combinations_with_replacement(range(n), order)))
+    times = [factorial(order) / prod(map(factorial, np.unique(one, return_counts=True)[1])) for one in places]
+    return tuple(places.T), np.array(times)
 
 
 def _cancelling(slope: Array, roots: Array) -> Array:

@@ -175,6 +175,7 @@ def _slip_gradients(reduction: Reduction) -> ArrayFunction:
 
 def in_columns(numbers: Any, count: int) -> Array:
     """Array (count, columns) whose columns are numbers or arrays (count,)."""
-    if not len(numbers):
-        return np.empty((count, 0))
-    return np.column_stack([np.broadcast_to(np.asarray(x, dtype=float), (count,)) for x in numbers])
+    found = np.empty((count, len(numbers)))
+    for i, number in enumerate(numbers):  # np.broadcast_to and np.column_stack take ten times as long
+        found[:, i] = number
+    return found

@@ -205,23 +205,23 @@ def _settled(
     count, n = scales.shape
     state, unknowns = guess[:, :n].copy(), guess[:, n:].copy()
     nothing = np.full((count, n, n), np.nan)
-    change, size = np.full((count, n), np.inf), np.full(count, np.inf)
+    size, settled = np.full(count, np.inf), np.zeros(count, dtype=bool)
     for _ in range(ROUNDS):
         velocity, force, pressure = inputs
         here = Rest(reduction, point, velocity, force, pressure, state, unknowns, scales, nothing, nothing[:, 0])
         rates, slowest, solved = solved_at(here, state[:, None, :])
-        unknowns = np.where(np.isfinite(solved[:, 0]), solved[:, 0], unknowns)
+        unknowns = np.where(np.isfinite(solved[:, 0]) & ~settled[:, None], solved[:, 0], unknowns)
         matrix = slopes_at(reduction, point, inputs, state, unknowns, scales)
         good = np.all(np.isfinite(matrix), axis=(1, 2)) & np.all(np.isfinite(rates[:, 0]), axis=1)
         change = np.full((count, n), np.nan)
-        for i in np.flatnonzero(good):
+        for i in np.flatnonzero(good & ~settled):
             try:
                 change[i] = -np.linalg.solve(matrix[i], rates[i, 0] / scales[i])
             except np.linalg.LinAlgError:
                 continue
         state = state + np.where(np.isfinite(change), change, 0.0) * scales
         before, size = size, np.max(np.abs(change) / (1 + np.abs(state / scales)), axis=1)
-        settled = (size <= SETTLED) | ((size <= ROUNDED) & (size > 0.5 * before))
+        settled |= (size <= SETTLED) | ((size <= ROUNDED) & (size > 0.5 * before))
         if not np.any(~settled & np.isfinite(size)):
             break
     slides = good & settled & (slowest[:, 0] > 0)

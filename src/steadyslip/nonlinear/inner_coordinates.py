@@ -10,9 +10,14 @@ MOST_INNER = 8
 minutes for compilation alone; a basin's neighbourhood has terms by the fourth power of the number of variables."""
 
 
+def inner_count(model: Model) -> int:
+    """Number of degrees of freedom of structures."""
+    return sum(one.inner for one in model.coordinates)
+
+
 def refuse_many_inner(model: Model, what: str) -> None:
     """Raise NotAvailable if structures have too many degrees of freedom for `what` (plural noun in the message)."""
-    count = sum(one.inner for one in model.coordinates)
+    count = inner_count(model)
     if count > MOST_INNER:
         raise NotAvailable(
             f"{what} are not offered with {count} degrees of freedom of structures; allowed: {MOST_INNER}; reduce "

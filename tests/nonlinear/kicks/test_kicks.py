@@ -334,7 +334,7 @@ def test_all_kicks_of_a_threshold_share_their_steps(monkeypatch):
     """With few steps altogether the rest is undecided, not followed for ever."""
     a_rig = tilted(0.3, 1.02)
     whole = ss.threshold(a_rig, precision=1e-4)
-    monkeypatch.setattr("steadyslip.nonlinear.kicks.threshold.STEPS", 1e4)
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.STEPS", 1e4)
     found = ss.threshold(a_rig, precision=1e-4)
     assert (whole.decided, found.decided, found.interrupted) == (True, False, False)
     assert found.bracket[0] < whole.size < found.bracket[1]

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 import steadyslip as ss
 from machines import same_block
 from steadyslip.machine import Machine, Pull, StructureBody, StructureData, StructurePoint, Surface
+from steadyslip.nonlinear.kicks import kicks, outcomes, spans
 from steadyslip.nonlinear.kicks.kicks import Kicked
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.spans import StepBudget
@@ -82,6 +83,43 @@ def test_a_blade_comes_back_from_blows_as_integrated_by_scipy(kick):
 def test_the_work_of_a_threshold_shrinks_as_steps_cost_more():
     steps = [StepBudget.of(1e9, n).steps for n in (1, 3, 6, 12)]
     np.testing.assert_allclose(steps, [1e9, 1e9, 1e9 / 8, 1e9 / 64])
+
+
+def test_kicks_of_a_ringing_structure_take_the_steps_allowed_and_say_what_decides_more(monkeypatch):
+    steps, allowed = [], 2e5
+    monkeypatch.setattr(kicks, "STEPS_OF_STRUCTURES", allowed)
+    monkeypatch.setattr(outcomes, "advanced_runs", counted(steps))
+    machine, *_ = blade(damping=1e-5)
+    found = ss.threshold(machine, "velocity", at="blade.tip")
+    assert not found.decided
+    assert sum(steps) <= 1.1 * allowed  # motions share what is left, in every span
+    assert found.survived > 0.01 * SPEED  # what was found before is kept
+    assert str(found).endswith(
+        "; fewer steps suffice for smaller kicks (up_to), larger errors per step (rtol=1e-6), more damping, "
+        "fewer modes (kept_modes)"
+    )
+
+
+def counted(steps):
+    """`advanced_runs` that appends its integration steps to a list."""
+
+    def advanced_runs(runs, *args, **more):
+        found = spans.advanced_runs(runs, *args, **more)
+        steps.append(float(np.nansum(found.steps)))
+        return found
+
+    return advanced_runs
+
+
+def test_edges_of_many_kicks_are_those_of_each():
+    """Steady slidings after kicks are solved for together; each must not depend on the others."""
+    machine, *_ = blade(elements=1, load=80.0)
+    kicked = Kicked(machine, "velocity", -1, "before", {}, 0, None)
+    sizes = np.geomspace(1e-3, 9.0, 24)
+    together = kicked.rest_after(np.zeros(24, dtype=int), sizes)
+    alone = [kicked.rest_after(np.zeros(1, dtype=int), size[None]) for size in sizes]
+    np.testing.assert_array_equal(together.state, np.concatenate([one.state for one in alone]))
+    np.testing.assert_array_equal(together.stable, np.concatenate([one.stable for one in alone]))
 
 
 def test_a_surface_beneath_cannot_be_displaced_at_once():

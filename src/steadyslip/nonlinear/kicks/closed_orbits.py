@@ -16,12 +16,14 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.kernels.runner import STATUSES
+from steadyslip.nonlinear.inner_coordinates import inner_count
 from steadyslip.nonlinear.kicks.field import rates_at
 from steadyslip.nonlinear.kicks.spans import MotionBatch, advanced_runs, constant_inputs
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.flow import FlowRunner
 
 BESIDE = 1e-4  # step of finite differences, natural sizes
+MOST_COMPILED = 12  # variables, times contacts, of structures: 12 take 3 CPU s, 15 take 8, 10 with two contacts 10
 ROUNDS = 8  # limit of Newton iterations
 CLOSED = 1e-6  # distance after a period below which an orbit is closed, natural sizes
 LOOSE = 1e3  # as CLOSED, in integration tolerances, if that is more
@@ -36,9 +38,13 @@ DONE = STATUSES.index("done")
 def on_long_cycle(runs: MotionBatch, one: int, state: Array, unknowns: Array) -> bool:
     """True if one run, now at `state` (n,), is on an attracting cycle of several slip events or turns.
 
-    `unknowns` (u,) solve the algebraic equations at `state`, NaN where they are not known.
+    `unknowns` (u,) solve the algebraic equations at `state`, NaN where they are not known. False for structures whose
+    variational equations take long to compile.
     """
     which, rest = np.array([one]), runs.rest
+    model = rest.reduction.model
+    if inner_count(model) and len(state) * len(model.contacts) > MOST_COMPILED:
+        return False
     inputs = constant_inputs(
         np.ones(1), rest.velocity[which], np.zeros(1), rest.pressure[which], rest.force[which]
     )  # fmt: skip

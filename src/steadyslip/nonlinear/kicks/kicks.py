@@ -24,7 +24,7 @@ from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.motion.status import NEEDS_MASS
 from steadyslip.motion.targets import Targets
-from steadyslip.nonlinear.inner_coordinates import refuse_many_inner
+from steadyslip.nonlinear.inner_coordinates import inner_count, refuse_many_inner
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import contacts_of, outcomes_of
 from steadyslip.nonlinear.kicks.places import largest_blow, place_problems, refuse_jump, size_units, struck
@@ -32,6 +32,8 @@ from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import STIFF, MotionBatch, StepBudget, continuous_at
 
+STEPS = 1e9  # limit of integration steps for all motions of one threshold: about a minute on two cores
+STEPS_OF_STRUCTURES = 2e8  # as STEPS, with structures; with the square of the number of variables: some 10 CPU s
 PATIENCE = 5.0  # factor on the longest simulated time, against that in a scan, for motions near the threshold
 
 
@@ -192,6 +194,12 @@ class Kicked:
         self.unit_name, units, speeds = size_units(self.jobs, self.rest, kick, self.at)
         self.units, self.body_speed = (np.broadcast_to(one, (self.size,)) for one in (units, speeds))
 
+    def limit_steps(self) -> None:
+        """Limit the integration steps of all motions to those that one threshold may take."""
+        structures, variables = inner_count(self.jobs.reduction.model), self.rest.state.shape[1]
+        limit = (STEPS_OF_STRUCTURES, variables, 2) if structures else (STEPS, variables)
+        self.budget = StepBudget.of(*limit)
+
     # -- sizes
 
     @property
@@ -285,7 +293,8 @@ class Kicked:
 
     def contacts(self, which: Array, sizes: Array, threads: int | None = None) -> Array:
         """Name of the contact at which each kick leads to loss of contact or blow-up, (n,); else empty."""
-        return contacts_of(self.runs(which, sizes), np.arange(len(which)), threads)
+        runs = replace(self.runs(which, sizes), budget=StepBudget())  # to the ends that are known
+        return contacts_of(runs, np.arange(len(which)), threads)
 
     def _jobs(self, which: Array) -> Jobs:
         """Jobs of the rigs `which` that start in steady sliding."""

@@ -37,6 +37,7 @@ CERTAIN = (BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION)
 OPEN = -1  # in arrays of outcomes: not decided yet
 
 USUAL = 3  # number of state variables of a slider, for which budgets of steps are given
+FEWEST = 100  # least limit of steps of one motion, whatever is left to all
 STIFF = "rodas4"  # method for stiff motions, and for those for which the explicit method needs too many steps
 LOADING = 40.0  # advance of the load point in the first span, natural lengths; each span is twice as long as the last
 TURNS = 3.0  # added to the first span, natural periods
@@ -60,9 +61,13 @@ class StepBudget:
     steps: float = np.inf
 
     @classmethod
-    def of(cls, steps: float, variables: int) -> StepBudget:
-        """Budget of `steps` for a slider, reduced for more variables by the cube of their number (cost of a step)."""
-        return cls(steps * min(1.0, (USUAL / variables) ** 3))
+    def of(cls, steps: float, variables: int, power: int = 3) -> StepBudget:
+        """Budget of `steps` for a slider, reduced for more variables by a power of their number (cost of a step)."""
+        return cls(steps * min(1.0, (USUAL / variables) ** power))
+
+    def each(self, motions: int, most: int) -> int:
+        """Limit of the steps of each of several motions in one span: `most`, or an equal share of what is left."""
+        return int(min(most, max(FEWEST, self.steps / motions)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +184,9 @@ def advanced_runs(
 
     `unknowns` (k, u) solve the algebraic equations at `start`, NaN where they are not known.
     """
-    jobs, rest = replace(runs.jobs, options=options or runs.jobs.options), runs.rest
+    options = options or runs.jobs.options
+    options = replace(options, most_steps=runs.budget.each(len(which), options.most_steps))
+    jobs, rest = replace(runs.jobs, options=options), runs.rest
     velocity, force, pressure = rest.velocity[which], rest.force[which], rest.pressure[which]
     jump = runs.jump[which] if start is None else np.zeros(len(which))
     point = jobs.point.part(which)

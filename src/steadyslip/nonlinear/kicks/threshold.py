@@ -23,12 +23,13 @@ from steadyslip.nonlinear.kicks.spans import (
     BLOW_UP,
     CERTAIN,
     CONTACT_LOST,
+    EXHAUSTED,
     INTERRUPTED,
     LATE,
     OUTCOMES,
     RETURNS,
+    SPENT,
     UNDECIDED,
-    StepBudget,
     doubt_of,
 )
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, NormalStressStep, VelocityStep
@@ -36,9 +37,11 @@ from steadyslip.protocol import DisplacementStep, DisturbanceStep, NormalStressS
 COARSE = 192  # number of sizes in the first scan
 BLOCK = 48  # number of sizes simulated side by side
 FINE = 47  # number of sizes between the ends of a bracket in each round of narrowing
-STEPS = 1e9  # limit of integration steps for all motions of one threshold
 AT_EDGE = 1e-5  # least relative width of a bracket at an edge of stability, near which motions return very slowly
-LASTING = ("velocity", "normal-stress", "normal-force", "force")  # kicks that change an input for good
+LASTING = ("velocity", "normal-stress", "normal-force", "force")  # kicks that change an input for good, but for blows
+USED_UP = tuple(map(doubt_of, (LATE, EXHAUSTED, SPENT)))  # doubts of motions that would need more time or steps
+TOGETHER = 256  # number of steady slidings after kicks that are solved for together
+BITS = 60  # halvings of a bracket that reach rounding
 BEYOND = 1.01  # factor on the size of an edge at which the outcome beyond is simulated
 
 
@@ -107,7 +110,21 @@ class Threshold(Displayed):
         return self.rig.area
 
     def __str__(self) -> str:
-        what = f"{self.kick} kick{' that lasts' if self.kick in LASTING else ''}{f' at {self.at}' if self.at else ''}"
+        return self._found() + self._way_out()
+
+    def _way_out(self) -> str:
+        """What decides more kicks, where time or steps were used up; else empty."""
+        if self.decided or self.interrupted or self.doubt not in USED_UP:
+            return ""
+        modes = ", fewer modes (kept_modes)" if self.rig.mechanism().structures else ""
+        return (
+            f"; fewer steps suffice for smaller kicks (up_to), larger errors per step (rtol=1e-6), more damping{modes}"
+        )
+
+    def _found(self) -> str:
+        """The bracket, and what lies beyond it or why it is not known."""
+        lasts = " that lasts" if self.kick in LASTING and not (self.at and self.kick == "velocity") else ""
+        what = f"{self.kick} kick{lasts}{f' at {self.at}' if self.at else ''}"
         low, _ = self.bracket
         if self.size == 0:
             return f"{what}: none survived, steady sliding is unstable"
@@ -224,8 +241,8 @@ def threshold(
     sliding that no motion leaves; it does not if it blows up, loses contact or is on a closed orbit that attracts; else
     it is undecided. Where the steady sliding after a kick is not stable nothing returns, and the search ends. If it is
     neutrally stable, small motions persist, and every bounded motion counts as returning. All motions together take at
-    most a billion integration steps, fewer for machines with more variables, about a minute on two cores; motions
-    without an outcome by then are undecided.
+    most a billion integration steps, fewer for machines with more variables, about a minute on two cores, and some 10
+    CPU s for machines with structures; motions without an outcome by then are undecided.
 
     Examples
     --------
@@ -266,7 +283,7 @@ class _Search:
 
     def __init__(self, kicked: Kicked, progress: Callable[[int, float, float], None] | None) -> None:
         self.kicked, self.progress = kicked, progress
-        kicked.budget = StepBudget.of(STEPS, kicked.rest.state.shape[1])
+        kicked.limit_steps()
         self.low, self.high, self.edge = 0.0, np.inf, np.inf
         self.outcome = self.doubt = RETURNS
         self.tried, self.interrupted = 0, False
@@ -360,27 +377,31 @@ class _Search:
 def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
     """Smallest size beyond which no stable steady sliding exists after the kick, (n,); inf if none is found.
 
-    The first of the rising `sizes` without one is found, then the size is bisected to rounding.
+    The first of the rising `sizes` without one is found, then the bracket is narrowed to rounding.
     """
-    found = np.full(len(which), np.inf)
-    if not kicked.moves_rest:
-        return found
     low, high = np.zeros(len(which)), np.full(len(which), np.inf)
-    going = np.arange(len(which))
-    for size in sizes:
-        good = kicked.may_return(which[going], np.full(len(going), size))
-        high[going[~good]] = size
-        low[going[good]] = size
-        going = going[good]
-        if not len(going):
-            break
+    going, start = np.arange(len(which) if kicked.moves_rest else 0), 0
+    while len(going) and start < len(sizes):
+        block = sizes[start : start + max(1, TOGETHER // len(going))]
+        start += len(block)
+        tried = np.tile(block, (len(going), 1))
+        good = kicked.may_return(np.repeat(which[going], len(block)), tried.ravel()).reshape(tried.shape)
+        _bracket(low, high, going, tried, good)
+        going = going[np.isinf(high[going])]
     open_ = np.flatnonzero(np.isfinite(high))
-    for _ in range(60):
-        middle = 0.5 * (low[open_] + high[open_])
-        good = kicked.rest_after(which[open_], middle).leading.real < 0
-        low[open_[good]], high[open_[~good]] = middle[good], middle[~good]
-    found[open_] = high[open_]
-    return found
+    each = max(1, min(FINE, TOGETHER // max(len(open_), 1)))
+    for _ in range(int(np.ceil(BITS / np.log2(each + 1))) if len(open_) else 0):
+        tried = low[open_, None] + (high - low)[open_, None] * np.arange(1, each + 1) / (each + 1)
+        rest = kicked.rest_after(np.repeat(which[open_], each), tried.ravel())
+        _bracket(low, high, open_, tried, (rest.leading.real < 0).reshape(tried.shape))
+    return high
+
+
+def _bracket(low: Array, high: Array, which: Array, sizes: Array, good: Array) -> None:
+    """Narrow brackets `low`, `high` of some rigs to the first of rising `sizes` (k, s) that is not `good` (k, s)."""
+    first = np.where(good.all(axis=1), sizes.shape[1], np.argmin(good, axis=1))
+    ends = np.column_stack([low[which], sizes, high[which]])
+    low[which], high[which] = (np.take_along_axis(ends, first[:, None] + i, axis=1)[:, 0] for i in (0, 1))
 
 
 @dataclass(frozen=True)
@@ -474,6 +495,7 @@ def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6,
         at = places[0] if len(places) == 1 else None
     found = threshold(rig, kick, at=at, direction=1 if up else -1, precision=precision, branch=branch)
     kicked = Kicked(rig, kick, found.direction, "before", {}, branch, None, at)
+    kicked.limit_steps()
     size = kicked.size_of(amount)
     outcome = int(kicked.outcomes(np.zeros(1, dtype=int), np.array([size]))[0])
     if outcome == INTERRUPTED:

@@ -9,6 +9,9 @@ import pytest
 
 import steadyslip as ss
 from machines import renamed, same_block, two_mass
+from steadyslip.nonlinear.orbits import follow, tracer
+from steadyslip.nonlinear.orbits.flow import FEW_STEPS
+from structure_work_at_random import drawn
 
 EXAMPLES = Path(__file__).parents[3] / "examples" / "machines"
 KP, LOW = "drive.kp", 1.5
@@ -202,3 +205,17 @@ def test_a_table_that_turns_round_in_its_cycle_is_followed_through_its_ringing()
     late = [one for one in found.cycles if one.peak_velocity > 1e-3]
     assert (np.diff([one.value for one in late]) < 0).all()
     assert (np.diff([one.peak_velocity for one in late]) > 0).all()
+
+
+def test_a_branch_of_a_structure_takes_the_steps_allowed_and_says_what_leads_further(monkeypatch):
+    (machine, _, along), made = drawn(2), []
+    monkeypatch.setattr(tracer, "MOST_STEPS", 200_000)
+    monkeypatch.setattr(follow, "Tracer", lambda *given: made.append(tracer.Tracer(*given)) or made[-1])
+    branch = ss.cycles(machine, along)
+    allowed = 200_000 * (3 / 7) ** 2  # seven variables
+    assert len(branch) > 10  # cycles that were found are kept
+    assert allowed <= made[0].flow.steps <= 1.25 * allowed + FEW_STEPS  # of one run
+    assert branch.end.endswith(
+        "million steps of integration taken, all that are spent on this part; ask for the rest with "
+        "between=(low, high), or give structures fewer modes (kept_modes) or more damping"
+    )

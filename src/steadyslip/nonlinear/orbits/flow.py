@@ -302,8 +302,7 @@ class FlowRunner:
         self, setting: FlowSetting, settings: Array, initial: Array, times: Array, machine: Runner | None = None
     ) -> Array:
         """Final values with sensitivities, or without if a plain `machine` is given; raises FlowFailure."""
-        if self.steps >= self.last_step:
-            raise FlowFailure("too many steps")
+        self._refuse_more()
         constants = (setting.plain if machine else setting.varied)[0]
         tables = (constants, np.ascontiguousarray(initial), settings, _rows(setting.inputs, times))
         call = Call(machine or self.sensitive, tables, len(times), np.empty(0))
@@ -315,6 +314,11 @@ class FlowRunner:
             raise self._failure(setting, outcome, int(np.flatnonzero(call.status != DONE)[0]))
         self._usual = self._usual if machine else int(taken.max())
         return outcome.state
+
+    def _refuse_more(self) -> None:
+        """Raise FlowFailure if all integration steps are used up."""
+        if self.steps >= self.last_step:
+            raise FlowFailure("too many steps")
 
     def field(self, setting: FlowSetting, states: Array) -> tuple[Array, Array, Array]:
         """Time derivatives (m, n) of states (m, n), their Jacobian (m, n, n) and derivative in the parameter (m, n)."""
@@ -345,6 +349,7 @@ class FlowRunner:
         KeyboardInterrupt
             If it was interrupted.
         """
+        self._refuse_more()
         initial = self._continuous(setting, state[None])
         settings = self._finer(setting.plain[1], amplitude)
         settings[:, SETTINGS.index("watch")] = settings[:, SETTINGS.index("record")] = 1.0
@@ -354,6 +359,7 @@ class FlowRunner:
                 settings[:, Setting.GUESS if k == 0 else behind + k - 1] = known
         tables = (*setting.plain[:1], initial, settings, _rows(setting.inputs, np.array([time])))
         outcome = run_tables(self.machine, tables, times)
+        self.steps += int(np.nansum(outcome.steps)) // QUICKER
         if outcome.status[0] == INTERRUPTED:
             raise KeyboardInterrupt
         if outcome.status[0] != DONE:

@@ -73,9 +73,10 @@ def cycles(
     doublings : int, optional
         Number of successive period doublings to follow onto the branch of twice the period.
     most_points : int, optional
-        Limit of cycles on a branch. Its integration steps are limited to four million, those of its cycles of twice the
-        period to as many, shared by the doublings. Cycles found until then are kept, and ``end`` gives the reason;
-        ``not_followed`` lists doublings for which no steps were left.
+        Limit of cycles on a branch. Its integration steps are limited to four million (with structures to as many as
+        take some 5 CPU s), those of its cycles of twice the period to as many, shared by the doublings. Cycles found
+        until then are kept, and ``end`` gives the reason; ``not_followed`` lists doublings for which no steps were
+        left.
     rtol : float, optional
         Relative error allowed per integration step; by default 1e-10, with mass 1e-9, for machines 1e-8.
     branch : int, optional

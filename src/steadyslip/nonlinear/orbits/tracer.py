@@ -11,6 +11,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
 from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve
+from steadyslip.nonlinear.inner_coordinates import inner_count
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.branch_piece import BranchPiece
 from steadyslip.nonlinear.orbits.cut_segments import MOST_GROWTH, cut
@@ -30,6 +31,8 @@ SLOW_STEPS, SLOW, FASTER_AGAIN = 8, 0.2, 3.0  # slow: 8 steps below 0.2 of LARGE
 OF_RANGE = 3.0  # scale of a state variable, in units of its range in the cycle, after rescaling
 UNRESOLVED = 1e-7  # distance from 1 of a small cycle's multiplier below which it does not decide stability
 MOST_STEPS = 4_000_000  # integration steps for all pieces of a branch: two example machines take three million
+USUAL = 3  # number of variables to which MOST_STEPS refers for structures; the cost of a step grows with its square
+OVER = 0.25  # share of the steps of a branch that a last step along it may take beyond them
 LOST = 1e-5  # error of the trivial multiplier beyond which more segments are tried
 LED = 30.0  # factor on LOST where sensitivities have loose tolerances (`FlowRunner.led`); still below `IMPRECISE`
 HIDDEN = 0.1  # largest share of rounding error in a small cycle's distance from the edge
@@ -61,11 +64,17 @@ class Tracer:
         self.logarithmic = flow.domain.low == 0 and onset.value > 0
         self.unit_of_value = abs(onset.value) or 1.0
         self.count, self.interrupted = 0, False
-        self.most_steps = self.last_step = MOST_STEPS
+        self.structures = inner_count(flow.reduction.model) > 0
+        self.most_steps = self.last_step = self.allowance
+
+    @property
+    def allowance(self) -> int:
+        """Limit of the integration steps of a branch: `MOST_STEPS`, with structures as many as take some 5 CPU s."""
+        return int(MOST_STEPS * min(1.0, (USUAL / self.flow.size) ** 2 if self.structures else 1.0))
 
     def begin_branch(self) -> None:
-        """Allow `MOST_STEPS` further integration steps, for another branch."""
-        self.last_step = self.flow.steps + MOST_STEPS
+        """Allow the integration steps of another branch."""
+        self.last_step = self.flow.steps + self.allowance
 
     def allot(self, parts: int) -> None:
         """Limit the integration steps of the next piece to 1/`parts` of those that the branch has left."""
@@ -215,6 +224,7 @@ class Tracer:
         """Extend a piece that has a `rest`, until it ends or its integration steps are used up."""
         points, begun = piece.rest or iter(()), self.flow.steps
         piece.rest, piece.end = None, ""
+        self.flow.last_step = self.most_steps + OVER * self.allowance
         try:
             for before, here in points:
                 if not piece.points:
@@ -248,10 +258,8 @@ class Tracer:
                     piece.end = f"most_points = {self.most} reached"
                     break
                 if self.flow.steps > self.most_steps:
-                    taken = piece.steps + self.flow.steps - begun
-                    piece.end = f"{taken / 1e6:.2g} million steps of integration taken, all that are spent on this part"
-                    piece.end += "; ask for the rest with between=(low, high)"
-                    piece.rest, piece.steps = points, taken
+                    piece.rest, piece.steps = points, piece.steps + self.flow.steps - begun
+                    piece.end = self._spent(piece.steps)
                     break
             lost = {ENDS["retraces"], ENDS["growth"], ENDS["runs away"], ENDS["winds"], ENDS["stands"]}
             lost |= set() if piece.points[-1].cycle.stable else {ENDS["precision"]}
@@ -263,7 +271,18 @@ class Tracer:
             piece.whole, piece.contact = failure.status == "contact lost", failure.contact
         except (Failure, np.linalg.LinAlgError) as failure:
             piece.end = f"broke off: the equations of a cycle were not solved any further ({failure})"
+        if self.flow.steps >= self.flow.last_step:
+            piece.end, piece.whole = self._spent(piece.steps + self.flow.steps - begun), True
+        self.flow.last_step = np.inf
         return piece
+
+    def _spent(self, steps: int) -> str:
+        """Text for the end of a piece whose integration steps are used up, and what leads further."""
+        fewer = ", or give structures fewer modes (kept_modes) or more damping" if self.structures else ""
+        return (
+            f"{steps / 1e6:.2g} million steps of integration taken, all that are spent on this part; ask for the rest "
+            f"with between=(low, high){fewer}"
+        )
 
     def _add_changes(self, piece: BranchPiece, before: BranchPoint, here: BranchPoint) -> None:
         """Append the bifurcations between two neighbouring cycles, and a cycle between each two bifurcations."""

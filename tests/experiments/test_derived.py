@@ -112,7 +112,7 @@ def test_without_a_displacement_the_rate_is_asked_for_and_named():
     fit = ss.fit(ss.lab_rig().with_values({"drive.velocity": 3e-6}), bare, protocol=protocol)
     assert fit.values["friction.a"] == pytest.approx(0.011, rel=0.01)
     text = " ".join(str(fit).split())
-    assert "the protocol that was given, from 3 um/s on" in text
+    assert "the given protocol, from 3 um/s on" in text
     assert "taken to move at 3 um/s (drive.velocity)" in text
 
 

@@ -253,7 +253,7 @@ def test_a_jump_at_an_unknown_time_makes_errors_that_are_not_gaussian():
         until=260.0,
     )
     fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), lab.record(rig, protocol, 3, count=800))
-    assert "errors of what the jump tells" in " ".join(str(fit).split())
+    assert "errors of parameters that depend on the jump" in " ".join(str(fit).split())
     assert "the load point is measured" not in str(fit)
     outline = ss.experiments.profile(fit, "alpha", reach=8, count=65)
     low, high = outline.interval(0.999)

@@ -384,8 +384,8 @@ def test_a_glitch_at_a_step_does_not_hide_its_time(seed, height, later, width):
 
 @pytest.mark.parametrize(
     ("ramp", "noise", "scatter", "words"),
-    [(0.0, 2e-6, 1e-5, ""), (0.0, 6e-6, 1e-5, ""), (0.0, 2e-7, 3e-4, "friction does not tell either: with"),
-     (1.5, 2e-6, 1e-5, "friction is better fitted so")],
+    [(0.0, 2e-6, 1e-5, ""), (0.0, 6e-6, 1e-5, ""), (0.0, 2e-7, 3e-4, "friction does not decide either: with"),
+     (1.5, 2e-6, 1e-5, "friction fits ramps better")],
 )  # fmt: skip
 def test_friction_is_asked_whether_a_step_is_a_ramp(ramp, noise, scatter, words):
     """Where the displacement does not tell, friction may; a fit says so where ramps would move its parameters."""

@@ -43,7 +43,7 @@ def test_the_range_of_slip_that_a_less_b_is_of_is_printed():
     """The load point moves at 5 um/s for 89.87 s after its change."""
     fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300))
     assert slip_after_changes(fit) == pytest.approx(5e-6 * 89.87, rel=0.01)
-    assert "range           at most 450 um of slip after a change of rate; a - b is without" in str(fit)
+    assert "range           at most 450 um of slip after a change of rate; a - b lacks what" in str(fit)
     assert "a - b are those over at most 450 um of slip" in ss.experiments.step_table(fit).methods
 
 

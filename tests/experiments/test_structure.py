@@ -145,7 +145,7 @@ def test_models_that_nearly_tie_are_both_named(ahead, told):
     fit.__dict__["remedies"] = tuple(both)
     said = " ".join(str(fit).split())
     assert "with friction.evolution = 'prz' the sum of squares" in said
-    assert (f"hardly told from that: friction.evolution = 'aging' (BIC {ahead:.1f} more, a +" in said) is told
+    assert (f"hardly distinguished from it: friction.evolution = 'aging' (BIC {ahead:.1f} more, a +" in said) is told
 
 
 @pytest.mark.slow
@@ -183,7 +183,7 @@ def test_no_memory_is_passed_over(monkeypatch):
 @pytest.mark.slow
 def test_a_memory_needs_a_change_of_the_normal_stress():
     fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), ss.record_from_arrays(**noisy(stepped())))
-    assert "without a change of the normal stress nothing tells friction.normal_memory.alpha" in " ".join(
+    assert "without a change of the normal stress nothing determines friction.normal_memory.alpha" in " ".join(
         str(fit).split()
     )
 
@@ -193,7 +193,7 @@ def test_what_nothing_mends_is_told():
     hum = np.sin(2 * np.pi * found["time"] / 0.7) * (found["time"] > 130)
     fit, said = fitted(found | {"friction": found["friction"] + 5 * lab.NOISE * hum})
     assert max(one.gain for one in fit.remedies) < 6
-    assert "none that was tried makes the fit better" in said
+    assert "no other model that was tried fits better" in said
 
 
 def test_a_clipped_peak_is_left_out():

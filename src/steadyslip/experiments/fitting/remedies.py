@@ -1,7 +1,7 @@
-"""Changes of a plan that would mend the structure in the residuals of its fit: other laws, a lag, a trend.
+"""Trials of other models for a fit whose residuals have structure: other laws, a lag, a trend.
 
-A test of residuals for structure cannot tell what one step of velocity leaves from correlated noise, and says nothing
-where a law or a channel is wrong; a fit with another law, a lag or a trend tells it by Schwarz's criterion.
+A test of residuals for structure cannot distinguish a misfit after one step of velocity from correlated noise, and does
+not show which law or channel is wrong. Fits with another law, a lag or a trend do, by Schwarz's criterion.
 """
 
 from __future__ import annotations
@@ -27,25 +27,27 @@ from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.slider import Slider
 
 STRONG_EVIDENCE = 6.0  # difference of BIC that counts as strong evidence (Kass & Raftery 1995)
-ROUNDS = 2  # changes that are tried on top of each other
-TRIAL_EFFORT, TRIAL_STARTS = 0.02, 3  # of each trial; on made records they end where the default ones do
-MEMORY_EFFORT = 0.1  # of trials with the memory of normal stress that a law lacks: none of these is passed over, and
-# on a record with one step of the stress those of .02 ended in a minimum of .68 of the sum of squares, not .42
-MAX_TREND = 2  # orders of a trend that are tried
-SMALL_FALL = 0.1  # of −2 log likelihood of white noise, which a short search leaves to be gained: nobody would see it
+ROUNDS = 2  # number of changes that are tried on top of each other
+TRIAL_EFFORT, TRIAL_STARTS = 0.02, 3
+"""Effort and starts of each trial; for simulated records they lead to the same minima as the default values."""
+MEMORY_EFFORT = 0.1
+"""Effort of trials with a memory of normal stress that the law lacks. On a record with one step of the stress, trials
+with .02 ended at a minimum of .68 of the sum of squares instead of .42."""
+MAX_TREND = 2  # highest order of a trend that is tried
+SMALL_FALL = 0.1  # tolerance of a short search, as decrease of −2 log likelihood for white noise: without effect
 
-SLOWER = np.geomspace(3.0, 300.0, 8)  # slip distances of a second state that are tried, in those of the first
+SLOWER = np.geomspace(3.0, 300.0, 8)  # slip distances of a second state that are tried, as multiples of the first
 TWO_STATES = "two states"
 WEAKENING = "a - b"
 
 NESTED = {"lag", "trend"}
-"""Unknowns without effect at 0, so that a fit with them begins at the minimum without."""
-LAGS = (0.0, -0.3, 0.3, -1.0, 1.0, -3.0, 3.0)  # from which a lag is searched, in its natural sizes; chosen by trial
+"""Kinds of unknowns without effect at 0, so that a fit with them starts at the minimum without them."""
+LAGS = (0.0, -0.3, 0.3, -1.0, 1.0, -3.0, 3.0)  # starting values of a lag, in its natural sizes; chosen by trial
 
 
 @dataclass(frozen=True)
 class FoundMinimum:
-    """Coordinates (p,) of the least sum of squares of a comparison."""
+    """Minimum of the sum of squares of a comparison, with its coordinates (p,)."""
 
     comparison: Comparison
     coordinates: Array
@@ -54,20 +56,20 @@ class FoundMinimum:
 
 @dataclass(frozen=True)
 class Remedy:
-    """Minimum with another law, or with a further option.
+    """Fit with another law, or with a further option, that was tried in place of a fit.
 
     Attributes
     ----------
     choice : str
-        What to ask for, as `--set` takes it.
+        Settings that differ, as in the option `--set`.
     ssq : float
         Sum of squares.
     gain : float
-        Fall of Schwarz's criterion (BIC), with as many samples as are independent in the residuals that remain.
+        Decrease of Schwarz's criterion (BIC), with the number of independent samples in the remaining residuals.
     p : float
         Probability of the whiteness test.
     values : dict of str to float
-        Values of all unknowns, by name, and of `WEAKENING` (of the first record) where the law has a and b.
+        Values of all unknowns, by name, and of `WEAKENING` (for the first record) if the law has a and b.
     """
 
     choice: str
@@ -78,20 +80,21 @@ class Remedy:
 
 
 def remedies(plan: Plan, ssq: float, values: Mapping[str, float], rounds: int = ROUNDS) -> tuple[Remedy, ...]:
-    """Minima with changes of the plan, the best first; up to two changes on top of each other.
+    """Fits with changes of the plan, the best first; up to two changes on top of each other.
 
-    Those that are soon tried come first, and all memories of normal stress that the law lacks where that changes; the
-    search ends once some have left no structure. Each trial is short: a longer one may find a better minimum.
+    Changes that take little time are tried first, and also all memories of normal stress that the law lacks, if the
+    normal stress changes. The search ends once a change leaves no structure. Each trial is short: a longer search may
+    find a better minimum.
 
     Parameters
     ----------
     plan : Plan
     ssq : float
-        Sum of squares of the fit of the plan itself.
+        Sum of squares of the fit of the unchanged plan.
     values : mapping of str to float
-        Values of that fit, by name of the unknown; a lag and a trend are searched from there.
+        Values of that fit, by name of the unknown, from which fits with a lag or a trend start.
     rounds : int, optional
-        Changes that are tried on top of each other.
+        Number of changes that are tried on top of each other.
     """
     found: list[Remedy] = []
     base, known, size = plan, {""}, len(plan.space())
@@ -123,20 +126,20 @@ def remedies(plan: Plan, ssq: float, values: Mapping[str, float], rounds: int = 
 
 
 def _is_mended(tried: Iterable[Remedy]) -> bool:
-    """True if a change that was tried leaves no structure in the residuals and fits better by strong evidence."""
+    """True if one of the trials leaves no structure in the residuals and fits better by strong evidence."""
     return any(one.p >= STRUCTURE and one.gain > STRONG_EVIDENCE for one in tried)
 
 
 def mended(plan: Plan, ssq: float, values: Mapping[str, float]) -> bool:
-    """True if a change that is soon tried, a lag, a trend or another evolution, fits better by strong evidence.
+    """True if a change that takes little time (a lag, a trend, another evolution) fits better by strong evidence.
 
     Parameters
     ----------
     plan, ssq, values
-        As of `remedies`.
+        As for `remedies`.
     """
     size, samples = len(plan.space()), sum(map(len, plan.records))
-    wanted = ssq * float(np.exp(-STRONG_EVIDENCE / samples))  # more is too little even in white noise
+    wanted = ssq * float(np.exp(-STRONG_EVIDENCE / samples))  # a larger sum is no strong evidence, even in white noise
     for own in _changed(plan):
         if not _choice(plan, own) or not _is_brief(own, values) or _lacks_memory(own, plan):
             continue
@@ -145,14 +148,14 @@ def mended(plan: Plan, ssq: float, values: Mapping[str, float]) -> bool:
         except NotAvailable:
             continue
         if best.ssq > wanted:
-            continue  # to describe the noise takes longer than this search
+            continue  # describing the noise would take longer than this search
         if remedy(plan, own, best.comparison, best.coordinates, ssq, size).gain > STRONG_EVIDENCE:
             return True
     return False
 
 
 def continued(plan: Plan, ssq: float, values: Mapping[str, float]) -> float:
-    """Sum of squares that a search reaches if it goes on with the effort of a trial; parameters as of `remedies`."""
+    """Sum of squares that a continued search reaches with the effort of a trial; parameters as for `remedies`."""
     try:
         return min(ssq, _from_minimum(plan, _effort(plan), values).ssq)
     except NotAvailable:
@@ -160,7 +163,7 @@ def continued(plan: Plan, ssq: float, values: Mapping[str, float]) -> float:
 
 
 def _ranked(found: list[Remedy]) -> tuple[Remedy, ...]:
-    """Remedies, the best first, each choice once; a trend before more states that are not better by strong evidence."""
+    """Remedies without duplicates, the best first; a trend precedes more states that are hardly better."""
     trend = any("fit.trend" in one.choice for one in found)
     own = {one.choice: one for one in sorted(found, key=lambda one: one.gain)}.values()
     ahead = {one.choice: STRONG_EVIDENCE * (trend and "fit.states" in one.choice) for one in own}
@@ -183,7 +186,7 @@ def _changed(plan: Plan) -> Iterator[Plan]:
 
 
 def with_words(plan: Plan, words: Sequence[str]) -> Plan:
-    """Plan with the alternative of its law that words name; what that has besides is free."""
+    """Plan with the alternative of its law that `words` name; further parameters of that law are free."""
     law: FrictionLaw = plan.rig.friction
     known = law.alternatives()
     for word in (word for word in known if word in words):
@@ -195,7 +198,7 @@ def with_words(plan: Plan, words: Sequence[str]) -> Plan:
 
 
 def _fitted(own: Plan, plan: Plan, ssq: float, size: int, values: Mapping[str, float], share: float) -> Remedy | None:
-    """Remedy of the plan `own`, searched with a share of a fit's effort; None if it cannot follow the records."""
+    """Remedy of the plan `own` from a search with a share of a fit's effort; None if it cannot follow the records."""
     effort = _effort(own, share)
     try:
         if _is_brief(own, values):
@@ -208,22 +211,19 @@ def _fitted(own: Plan, plan: Plan, ssq: float, size: int, values: Mapping[str, f
 
 
 def _is_brief(own: Plan, values: Mapping[str, float]) -> bool:
-    """True if a plan is searched from the values of a fit: what it has besides has no effect at 0."""
+    """True if the search for a plan can start from the values of a fit: further unknowns have no effect at 0."""
     return {one.parameter.partition(".")[0] for one in own.space().unknowns if one.name not in values} <= NESTED
 
 
 def _recalls(own: Plan, base: Plan) -> bool:
-    """True if a plan has the memory of normal stress that another lacks: no other change may stand in for it.
-
-    Not with more states besides, which take long.
-    """
+    """True if a plan has a memory of normal stress that the plan `base` lacks, and no more states, which take long."""
     before, after = base.rig, own.rig
     states = len(after.of_kind("evolution effect")) > len(before.of_kind("evolution effect"))
     return before.friction.forgets_stress() and not after.friction.forgets_stress() and not states
 
 
 def _lacks_memory(own: Plan, base: Plan) -> bool:
-    """True if a plan's law is that of another without its memory of normal stress: it fits no better."""
+    """True if the law of a plan is that of the plan `base` without its memory of normal stress: it fits no better."""
     law, whole = own.rig.friction, base.rig.friction
     return law != whole and replace(law, **{name: getattr(whole, name) for name in whole.decided_by_stress}) == whole
 
@@ -233,7 +233,7 @@ def _effort(own: Plan, share: float = TRIAL_EFFORT) -> Effort:
 
 
 def remedy(plan: Plan, own: Plan, comparison: Comparison, z: Array, ssq: float, size: int) -> Remedy:
-    """Remedy at a minimum of the plan `own`, in place of one of `plan` with `size` unknowns and the given `ssq`."""
+    """Remedy from a minimum `z` (p,) of the plan `own`, compared with that of `plan` (`size` unknowns, sum `ssq`)."""
     space = comparison.space
     r = comparison.residuals(z[None])[0][0]
     parts = [r[where] for where in comparison.slices]
@@ -247,7 +247,7 @@ def remedy(plan: Plan, own: Plan, comparison: Comparison, z: Array, ssq: float, 
 
 
 def weakening(rig: Slider, values: Mapping[str, float]) -> float | None:
-    """a − b (a less all b) of the first record by values of unknowns; None for a law without."""
+    """a − b (a minus the sum of all b) of the first record from values of unknowns; None for a law without a or b."""
     direct, evolving = (
         [values.get(n, values.get(f"{n}@1", rig.value(n) or 0.0)) for n in rig.of_kind(kind)]
         for kind in ("direct effect", "evolution effect")
@@ -258,9 +258,9 @@ def weakening(rig: Slider, values: Mapping[str, float]) -> float | None:
 def _from_minimum(
     own: Plan, effort: Effort, values: Mapping[str, float], lags: Sequence[float] = LAGS, wanted: float = np.inf
 ) -> FoundMinimum:
-    """Minimum of a plan with a lag or a trend more, from several values of those and the minimum without.
+    """Minimum of a plan with an added lag or trend, from several starting values and the minimum without them.
 
-    Searches end early that are not about to reach the sum of squares `wanted`.
+    Searches that will not reach the sum of squares `wanted` end early.
     """
     space, comparison = own.space(), own.for_trial().comparison(effort)
     begin = space.coordinates(np.array([values.get(one.name, 0.0) for one in space.unknowns]))
@@ -282,24 +282,24 @@ def _from_minimum(
 def slow_state(
     plan: Plan, ssq: float, with_trend: Plan, values: Mapping[str, float], gain: float = 0.0
 ) -> Remedy | None:  # fmt: skip
-    """Minimum with a second state of long slip distance in place of the last order of a trend; None for other laws.
+    """Fit with a second state of long slip distance in place of the last order of a trend; None for other laws.
 
-    A state whose slip distance is longer than what slides after a step evolves along a straight line, as a trend does,
-    but a - b is another.
+    A state whose slip distance is longer than the slip after a step evolves along a straight line, as a trend does, but
+    gives another a - b.
 
     Parameters
     ----------
     plan : Plan
-        That the remedy is one of.
+        Plan with which the remedy is compared.
     ssq : float
         Sum of squares with the trend.
     with_trend : Plan
         Plan with the trend.
     values : mapping of str to float
-        Values of its fit, by name of the unknown, from which the search begins.
+        Values of the fit with the trend, by name of the unknown, from which the search begins.
     gain : float, optional
-        Of the trend. That of the state is counted from there: numbers of independent samples in the residuals of both
-        differ by more than what tells one from the other.
+        Gain of the trend, to which the gain of the state over the trend is added: the numbers of independent samples
+        in both residuals differ too much for a direct comparison.
     """
     if TWO_STATES not in with_trend.rig.friction.alternatives() or len(_evolving(with_trend)) != 1:
         return None
@@ -326,10 +326,10 @@ def _evolving(plan: Plan) -> tuple[str, ...]:
 
 
 def _of_state(plan: Plan, one: Unknown, values: Mapping[str, float]) -> Array | float:
-    """Starting values of an unknown of the first or second state, from those of the only state of another plan."""
+    """Starting values of an unknown of the first or second state, from those of the single state of another plan."""
     if not (own := plan.rig.of_kind(one.kind)):
         return 0.0
-    known = own[0]  # the law's own, before those of memories
+    known = own[0]  # parameters of the law come before those of memories
     value = values.get(known, values.get(f"{known}@1", plan.rig.value(known) or 0.0))
     if ".states.2." not in one.parameter:
         return value
@@ -337,7 +337,7 @@ def _of_state(plan: Plan, one: Unknown, values: Mapping[str, float]) -> Array | 
 
 
 def _choice(plan: Plan, other: Plan) -> str:
-    """What differs between two plans, as `--set` takes it."""
+    """Settings that differ between two plans, as in the option `--set`."""
     law, changed = plan.rig.friction, other.rig.friction
     found = []
     for name in (item.name for item in fields(changed)):

@@ -2,7 +2,7 @@
 
 The direct effect is at least the first response to a step of the rate, the drop to the new steady friction gives
 a − b, the steepest rise of friction with displacement is at most the stiffness over normal stress, and the slip
-distance lies between a sample's and the whole record's. Many combinations are tried side by side.
+distance lies between the slip per sample and that of the whole record. Many combinations are tried side by side.
 """
 
 from __future__ import annotations
@@ -30,14 +30,12 @@ from steadyslip.model.sliding import steady_state
 
 WINDOW_SHARE = 0.5  # share of the window of a free time over which its starting values are spread
 SPIKE_RATIO = 2.0  # a sample is a spike if it is off its neighbours by more than this multiple of the range of friction
-MAX_STIFFNESS_RATIO = (
-    100.0  # largest starting value of k d_c/(aσ): stiffer machines cannot be known apart from friction
-)
-FASTER = 100.0  # largest starting value of a velocity scale, in the fastest rates of the drive: events are faster
+MAX_STIFFNESS_RATIO = 100.0  # largest starting value of k d_c/(aσ): records do not determine a stiffer machine
+FASTER = 100.0  # largest starting value of a velocity scale, as a multiple of the fastest rate: slip events are faster
 FURTHER = 2  # velocity scales that start independently of each other: v_a and v_b
 _DIRECT = (0.004, 0.01, 0.025)  # starting values of a without a velocity step: the range usual for rocks
 _SIGN = ("direct effect", "evolution effect")  # kinds of a and b
-OTHER_SIDE = (0.5, 2.0)  # b/a from which a minimum is sought where a - b has the other sign: what laboratories find
+OTHER_SIDE = (0.5, 2.0)  # starting values of b/a in a search for a − b of the other sign: usual in laboratories
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class Features:
     shortest, longest : float
         Range of slip distances that the record resolves, m.
     slowest, fastest : float
-        Range of the rates of the load point, m/s; without those at rest.
+        Range of the rates of the load point, m/s, without holds.
     """
 
     friction: float
@@ -121,7 +119,7 @@ def _step_response(record: Record, moved: Array, step: LoadStep) -> tuple[float,
     time, mu = record.time, record.friction
     fold = float(np.log(step.after / step.before))
     others = [s.time for s in record.steps if s.time > step.time + step.duration]
-    first = min(int(np.searchsorted(time, step.time)), len(time) - 1)  # another change may follow before it
+    first = min(int(np.searchsorted(time, step.time)), len(time) - 1)  # another change may follow before this sample
     end = max(min(others, default=float(time[-1])), float(time[first]))
     earlier = [s.time + s.duration for s in record.steps if s.time < step.time]
     begin = max(earlier, default=float(time[0]))
@@ -190,7 +188,7 @@ def starting_points(
     steepness = max(f.slope for f in found) * 10.0 ** (1.2 * grid[:, 3] - 0.1)
     steepness = np.minimum(steepness, MAX_STIFFNESS_RATIO * a / d_c)
     alpha = 0.1 + 0.5 * grid[:, 4]
-    alike = np.argsort(steepness / a)  # similar stiffness side by side: SIMD lanes wait for the slowest of them
+    alike = np.argsort(steepness / a)  # similar stiffness side by side, as SIMD lanes wait for the slowest one
     d_c, a, b, steepness, alpha, grid = (x[alike] for x in (d_c, a, b, steepness, alpha, grid))
     values = np.zeros((count, len(space)))
     for i, unknown in enumerate(space.unknowns):
@@ -221,7 +219,7 @@ def search_bounds(parts: Sequence[RecordPart], known: Sequence[Features], space:
         own = known if unknown.record is None else [known[unknown.record]]
         if unknown.kind == "slip distance":
             ends = min(f.shortest for f in own) / 5, max(f.longest for f in own) * 40
-        elif unknown.kind == "drainage":  # slower than the record, or faster than its samples: nothing to see
+        elif unknown.kind == "drainage":  # slower than the record, or faster than its samples, it has no effect
             times = [parts[k].record.time for k in range(len(parts)) if unknown.record in (None, k)]
             ends = 0.03 / max(map(np.ptp, times)), 10.0 / min(float(np.min(np.diff(time))) for time in times)
         elif unknown.kind == "direct effect":
@@ -249,7 +247,7 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
         rate = rig.drive.velocity / (references[0] or 1.0) if references else 1.0
         return np.asarray(own.friction - (a - b) * np.log(rate))
     if unknown.kind == "evolution effect":
-        if member and not alone:  # the first state takes up what the others leave
+        if member and not alone:  # the first state gets what the others leave
             return b * (0.35 + 0.5 * spare) if member == 1 else b * (0.65 - 0.5 * spare)
         return b
     if unknown.kind == "slip distance":
@@ -304,7 +302,7 @@ def _protocol_time(name: str, part: RecordPart) -> float:
 
 
 def of_other_sign(space: Space, coordinates: Array) -> Array:
-    """Coordinates (1, p) with b on the other side of a; none (0, p) unless one a and one b are unknown."""
+    """Coordinates (1, p) with the other sign of a − b; empty (0, p) unless exactly one a and one b are unknown."""
     kinds = [one.kind for one in space.unknowns]
     if any(kinds.count(kind) != 1 for kind in _SIGN):
         return coordinates[:0]

@@ -1,4 +1,4 @@
-"""Fits in netCDF files, with their records; reading a file executes nothing in it."""
+"""Storage of fits, with their records, in netCDF files; reading a file executes nothing in it."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ _OPTIONS = {
     "initial": str, "loss": str, "width": {float, None},
     "calibrated": {float, None}, "rtol": float,
 }  # fmt: skip
-_CURVE = ([float], float, float, float, int, [float], [float])  # the ends of its span, if it has any; the curve itself
-_NUMBERS = len(fields(Change)) - 1  # of a change in files, without its pieces; 8 before there were lags
+_CURVE = ([float], float, float, float, int, [float], [float])  # ends of its span, or none; then `Smooth.parts`
+_NUMBERS = len(fields(Change)) - 1  # numbers of a change in files, without its pieces; 8 in files without lags
 _COURSE = (float, [[float]], [float], [_CURVE], float, int, int, int, int, [[float]])  # servos or shapes last
 _COLUMNS = (*ROLES, "worth")
-KNOWN = "known"  # `initial` of a fit whose records begin as a fit of what came before left them
+KNOWN = "known"  # option `initial` of a fit whose `beginnings` are known from a fit to the time before
 RESULT_FORMS: dict[str, Any] = {
     "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool, "cut": bool},
     "unidentified": [{"weights": {str: float}, "deviation": float}],
@@ -70,7 +70,7 @@ S = TypeVar("S", bound=FitNumbers)
 
 
 def result_variables(fit: Fitted, samples: Sequence[str]) -> dict[str, Any]:
-    """Variables that the files of all fits have; `samples` names the dimension of each series."""
+    """Variables that files of all fits have; `samples` holds the name of each series' dimension."""
     variables: dict[str, Any] = {
         "coordinates": ("parameter", fit.coordinates, {"long_name": "place of the minimum, logarithms where positive"}),
         "value": ("parameter", np.array(list(fit.values.values())), {}),
@@ -87,7 +87,7 @@ def result_variables(fit: Fitted, samples: Sequence[str]) -> dict[str, Any]:
 
 
 def result_columns(samples: Sequence[str]) -> dict[str, ColumnRule]:
-    """Columns that `result_variables` makes."""
+    """Rules for reading the columns that `result_variables` makes."""
     along = ("parameter",)
     found = {name: ColumnRule(along) for name in ("coordinates", "value", "error")}
     found |= {"parameter": ColumnRule(along, text=True), "other": ColumnRule(("other",), text=True)}
@@ -101,7 +101,7 @@ def result_columns(samples: Sequence[str]) -> dict[str, ColumnRule]:
 
 
 def result_attributes(fit: Fitted) -> dict[str, Any]:
-    """Attributes of any fit, `RESULT_ATTRIBUTES`."""
+    """Attributes that files of all fits have, see `RESULT_ATTRIBUTES`."""
     return {
         "ssq": fit.ssq,
         "search": json.dumps(vars(fit.search)),
@@ -114,7 +114,7 @@ def result_attributes(fit: Fitted) -> dict[str, Any]:
 def result_of(
     table: ExpectedTable, found: dict[str, Any], stored: dict[str, Any], made: Callable[..., F], plan: Any
 ) -> F:
-    """Fit from the columns and attributes that all fits have, of the class `made`; a damaged one is refused."""
+    """Fit of the class `made` from the columns and attributes of a file; raises an error if they are damaged."""
     names = [one.name for one in plan.space().unknowns]
     if not (names == found["parameter"] == found["other"]):
         raise table.fault(f"its parameters are {', '.join(found['parameter']):.200}; expected {', '.join(names)}")
@@ -137,7 +137,7 @@ def result_of(
     )
     _check(table, fit)
     model = np.concatenate([found[f"model_{i}"] for i in range(1, len(noises) + 1)])
-    fit.__dict__["model"] = read_only(model)  # that the file holds, so that nothing is computed again
+    fit.__dict__["model"] = read_only(model)  # from the file, so that it is not computed again
     return fit
 
 
@@ -193,20 +193,20 @@ def save(fit: FitNumbers, path: str | PathLike[str]) -> None:
 
 
 def read(path: str | PathLike[str], made: type[S]) -> S:
-    """Read a fit that `save` wrote, as an instance of the class `made`.
+    """Fit that `save` wrote, as an instance of the class `made`.
 
     Nothing in the file is executed; a damaged file is refused.
 
     Raises
     ------
     NotAvailable
-        If the file is not one of ours, is damaged, or cannot be read.
+        If the file was not written by `save`, is damaged, or cannot be read.
     """
     return from_table(ExpectedTable(path, FIT, ATTRIBUTES), made)
 
 
 def from_table(table: ExpectedTable, made: type[S]) -> S:
-    """Read a fit from a file, or from a part of one, with the attributes `ATTRIBUTES`."""
+    """Fit from an open file, or from a part of one, with the attributes `ATTRIBUTES`."""
     stored = {name: table.json(table.attributes[name], form) for name, form in _FORMS.items()}
     described, noises, loading = stored["records"], stored["noise"], stored["loading"]
     weighted, present = stored["options"].pop("weighted"), stored["options"].pop("columns")
@@ -226,7 +226,7 @@ def from_table(table: ExpectedTable, made: type[S]) -> S:
                                               for i in range(len(records))))  # fmt: skip
     refits = stored["refits"]
     fit = result_of(table, found, stored, partial(made, joint=refits["joint"]), plan)
-    stored_results = {  # results that the file holds, so that nothing is computed again
+    stored_results = {  # results from the file, so that they are not computed again
         "as_measured": next(iter(refits["measured"]), None),
         "as_ramps": tuple(RampFit(*one) for one in refits["ramps"]),
         "remedies": tuple(Remedy(*one) for one in refits["remedies"]),
@@ -236,7 +236,7 @@ def from_table(table: ExpectedTable, made: type[S]) -> S:
 
 
 def _beginning(table: ExpectedTable, plan: Plan, rows: Array) -> Beginning:
-    """Beginning from its `Beginning.rows`."""
+    """Beginning from the rows that `Beginning.rows` returned."""
     if rows.shape[1] != len(plan.initial_sizes):
         raise table.fault(f"a record begins with {rows.shape[1]} differences, its law has {len(plan.initial_sizes)}")
     first, *spread = rows.tolist()
@@ -244,7 +244,7 @@ def _beginning(table: ExpectedTable, plan: Plan, rows: Array) -> Beginning:
 
 
 def _columns(present: list[list[str]], weighted: bool, known: bool) -> dict[str, ColumnRule]:
-    """Columns that the file of a fit must have, given those of its records."""
+    """Rules for the columns that the file of a fit must have; `present` lists the columns of each record."""
     found = result_columns([f"sample_{i}" for i in range(1, len(present) + 1)])
     for i, names in enumerate(present, start=1):
         samples = (f"sample_{i}",)
@@ -310,7 +310,7 @@ def _course_from_json(one: list[Any]) -> Course:
 
 
 def _change_from_json(one: list[float]) -> Change:
-    """Change from its numbers and, after these, three of each of its pieces."""
+    """Change from its numbers in a file, followed by three numbers for each of its pieces."""
     rest = one[_NUMBERS:]
     if len(one) not in (8, _NUMBERS + 3 * (len(rest) // 3)):
         raise ValueError(f"has a change of {len(one)} numbers")
@@ -333,7 +333,7 @@ def _record(
 
 
 def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, Any], weights: Any) -> Plan:
-    """Plan made from the options of the file, with the checks of user input."""
+    """Plan from the options of the file, which are checked like user input."""
     from steadyslip.files.specifications import protocol_from_text, slider_from_text
 
     text, source = table.attributes["rig"], str(table.path)
@@ -354,7 +354,7 @@ def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, 
 
 
 def _check(table: ExpectedTable, fit: Fitted) -> None:
-    """Raise an error for numbers that no fit has, such as negative variances."""
+    """Raise an error for numbers that are impossible for a fit, such as negative variances."""
     bad = {
         "coordinates": not np.all(np.isfinite(fit.coordinates)),
         "ssq": not 0 <= fit.ssq < np.inf,

@@ -31,13 +31,12 @@ from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
 
-MAX_END_OFFSET = 3.0  # mean of the first or last residuals, in rms of the record's, above which an end is off the model
+MAX_END_OFFSET = 3.0  # an end is off the model if its mean residual exceeds this multiple of the record's rms residual
 END_SAMPLES = 5  # number of first or last residuals in that mean; also one in two hundred, if that is more
-UNLIKE = 0.1  # relative difference of weights of records from which they are told; means of samples make less
-OVERSHOOT = 0.01  # of a servo, as a share of the step, from which it is named
-MAX_JUMP_ERROR = (
-    0.1  # standard deviation of the time of a jump, in sampling intervals, above which errors are not Gaussian
-)
+UNLIKE = 0.1  # weights of records are printed from this relative difference, which averaging does not reach
+OVERSHOOT = 0.01  # least overshoot of a servo that is mentioned, as a share of the step
+MAX_JUMP_ERROR = 0.1
+"""Errors are not Gaussian if the time of a jump has a larger standard deviation, in sampling intervals."""
 
 
 def words(fit: FitNumbers) -> str:
@@ -62,12 +61,12 @@ def words(fit: FitNumbers) -> str:
 
 
 def _stress_assumed(fit: FitNumbers) -> bool:
-    """True if no record has a column of normal stress, so that the rig's value is used."""
+    """True if no record has a column of normal stress, so that the value of the rig is used."""
     return fit.plan.pressed and all(record.normal is None for record in fit.plan.records)
 
 
 def _over_stress(fit: FitNumbers, one: Any) -> str | None:
-    """Text of stiffness over normal stress, which friction alone determines; None for other parameters."""
+    """Text on stiffness over normal stress, which friction determines without any stress; None for other parameters."""
     bare, _, record = one.name.partition("@")
     if bare not in ("slider.stiffness", "slider.axial_stiffness"):
         return None
@@ -91,18 +90,18 @@ def _quality(fit: FitNumbers) -> list[str]:
 
 
 def _range_of_weakening(fit: FitNumbers) -> list[str]:
-    """Line on the slip after changes of rate, beyond which a record says nothing of a - b; none without an a - b."""
+    """Line on the slip after changes of rate, as a - b is only known for less slip; no line without an a - b."""
     slip = slip_after_changes(fit)
     if not slip or all(one.name.partition("@")[0] != WEAKENING for one in fit.derived):
         return []
     slipped = format_quantity(slip, "m", 2)
-    return [f"range           at most {slipped} of slip after a change of rate; a - b is without what needs more"]
+    return [f"range           at most {slipped} of slip after a change of rate; a - b lacks what needs more slip"]
 
 
 def slip_after_changes(fit: FitNumbers) -> float:
-    """Longest displacement (m) of a load point between a change of its rate and the next or the end; 0 without one.
+    """Longest displacement (m) of a load point from a change of its rate to the next change or the end; 0 without one.
 
-    A state with a longer slip distance hardly evolves in the records, so that a - b of the fit is without it.
+    A state with a longer slip distance hardly evolves in the records, so that a - b of the fit does not include it.
     """
     longest = 0.0
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
@@ -113,7 +112,7 @@ def slip_after_changes(fit: FitNumbers) -> float:
 
 
 def _weights(fit: FitNumbers) -> list[str]:
-    """Line on the weights of records, relative to the largest; none where they weigh alike."""
+    """Line on the weights of records, relative to the largest; no line if they are nearly equal."""
     levels = np.array([np.mean(fit.part(fit.comparison.weights, i)) for i in range(len(fit.plan.records))])
     if np.allclose(levels, levels[0], rtol=UNLIKE):
         return []
@@ -122,7 +121,7 @@ def _weights(fit: FitNumbers) -> list[str]:
 
 
 def _left_out(fit: FitNumbers) -> list[str]:
-    """Warnings on samples left out because their channel was saturated or because they are outliers."""
+    """Warnings on samples that were left out because their channel was at its limit or because they are outliers."""
     return [
         f"{record.source}: {note}; give weights to keep them"
         for record in fit.plan.records
@@ -134,7 +133,8 @@ def _left_out(fit: FitNumbers) -> list[str]:
 def warnings(fit: FitNumbers) -> list[str]:
     """Warnings on a fit, each a sentence, that a reader must know before using the numbers.
 
-    A better model comes first; where it leaves noise alone, times at their bounds are a consequence that it mends.
+    A better model comes first; if it leaves only noise, warnings on times at their bounds are omitted, as the better
+    model removes their cause.
     """
     best = better(fit)
     follows = fit.at_bounds if best is not None and best.p >= STRUCTURE else ()
@@ -155,30 +155,30 @@ def _ends_off_model(fit: FitNumbers) -> list[str]:
         begins, ends = (max((float(np.mean(side[:n])) for n in few), key=abs) for side in (own, own[::-1]))
         if fit.plan.initial == "steady" and not fit.plan.rests(i) and abs(begins) > MAX_END_OFFSET * usual:
             if fit.plan.beginnings:
-                begun, cure = "as the step before left it", "fit this part alone (between), its beginning"
+                begun, cure = "as the step before left it", "fit this part alone (between), with its initial state"
             else:
-                begun, cure = "with steady sliding", "where the record does not, let its beginning be"
+                begun, cure = "with steady sliding", "if the record does not, let its initial state be"
             found.append(
-                f"{record.source}: friction begins {begins:+.2g} beside the model, which begins {begun}; {cure} free "
-                "(initial = 'free'), or cut it off (between)"
+                f"{record.source}: friction begins {begins:+.2g} off the model, which begins {begun}; {cure} free "
+                "(initial = 'free'), or cut the beginning off (between)"
             )
         if abs(ends) > MAX_END_OFFSET * usual:
             found.append(
-                f"{record.source}: friction ends {ends:+.2g} beside the model; where the loading changed at the very "
-                "end, cut that off (between)"
+                f"{record.source}: friction ends {ends:+.2g} off the model; if the loading changed at the very end, "
+                "cut that off (between)"
             )
     return found
 
 
 def _vague_jumps(fit: FitNumbers) -> list[str]:
-    """Warnings on jumps whose time is hardly determined, so that errors are not Gaussian."""
+    """Warnings on jumps whose time is poorly determined, so that errors are not Gaussian."""
     found = []
     for i, one in enumerate(fit.space.unknowns):
         if _between_samples(fit, one) and float(fit.covariance[i, i]) > MAX_JUMP_ERROR**2:
             found.append(
-                f"when exactly the drive or the normal stress jumped between {one.low:.7g} and {one.high:.7g} s is "
-                f"hardly determined ({one.name}); errors of what the jump tells, such as alpha from one of normal "
-                "stress, are not Gaussian: take profile or bootstrap"
+                f"the time of the jump of the drive or the normal stress between {one.low:.7g} and {one.high:.7g} s is "
+                f"poorly determined ({one.name}); errors of parameters that depend on the jump, such as alpha, are not "
+                "Gaussian: use profile or bootstrap"
             )
     return found
 
@@ -218,22 +218,22 @@ def _possible_ramps(fit: FitNumbers) -> list[str]:
 
 
 def _ramp_effect(fit: FitNumbers, tried: tuple[RampFit, ...]) -> str:
-    """Text on whether friction distinguishes ramps from steps, and on how ramps change the parameters."""
+    """Clause on whether friction distinguishes ramps from steps, and on how ramps change the parameters."""
     alike, best = _alike(fit, tried), min(tried, key=lambda one: one.ssq)
     longest = alike[-1] if tried[0] in alike else best
     changes = ", ".join(f"{_symbol(n)} {longest.values[n] / fit.values[n] - 1:+.1%}" for n in _steep_names(fit.rig(0))
                         if n in longest.values and fit.values.get(n))  # fmt: skip
-    verdict = "friction does not tell either" if tried[0] in alike else "friction is better fitted so"
+    verdict = "friction does not decide either" if tried[0] in alike else "friction fits ramps better"
     return f"{verdict}: with {_lengths(fit, longest)} the sum of squares is {_relative_change(fit, longest)}; {changes}"
 
 
 def better(fit: FitNumbers) -> Remedy | None:
-    """What to fit again with, since it follows the records better by strong evidence; None for nothing."""
+    """Best of the other models that fit the records better by strong evidence; None if there is none."""
     return next((one for one in fit.remedies if one.gain >= STRONG_EVIDENCE), None)
 
 
 def _structure(fit: FitNumbers) -> list[str]:
-    """Warning on structure in the residuals, or on a normal stress that this law does not remember; what mends it."""
+    """Warning on structure in the residuals, or on a missing memory of normal stress, and the model that removes it."""
     changing = [record.source for record in fit.plan.records if record.stress_changes]
     forgets, structure, best = forgets_changes(fit.plan), fit.whiteness.p < STRUCTURE, better(fit)
     if forgets:
@@ -243,10 +243,10 @@ def _structure(fit: FitNumbers) -> list[str]:
     else:
         said = "residuals alone look like noise, but another model follows the records better"
     if best is None and structure and not fit.search.converged:
-        return [f"{said}, which says nothing before the search has come to its end"]
+        return [f"{said}, which means nothing before the search has ended"]
     if best is None and structure:
         tried = "; ".join(one.choice for one in fit.remedies)
-        return [f"{said}; none that was tried makes the fit better ({tried}): the machine's own noise, or another law"]
+        return [f"{said}; no other model that was tried fits better ({tried}): noise of the machine, or another law"]
     if best is None and fit.plan.trend and fit.remedies:
         return [f"residuals are noise; {_as_slow_state(fit, fit.remedies[0])}"]
     if best is None:
@@ -258,38 +258,38 @@ def _structure(fit: FitNumbers) -> list[str]:
     return [
         f"{said}: with {_asked(fit, best)} the sum of squares is {best.ssq / fit.ssq:.2g} of this, "
         f"BIC {best.gain:.0f} less, {follows} "
-        "fit again with that, by --set or in the file (lab_rig and fit in Python)"
+        "fit again with these settings, by --set or in the file (lab_rig and fit in Python)"
     ]
 
 
 def _near(fit: FitNumbers, best: Remedy) -> list[Remedy]:
-    """Other models that the records hardly tell from the best."""
+    """Other models between which and the best one the records hardly distinguish."""
     return [one for one in fit.remedies if one is not best and best.gain - one.gain < STRONG_EVIDENCE <= one.gain]
 
 
 def _as_slow_state(fit: FitNumbers, one: Remedy) -> str:
-    """Clause on a second state of long slip distance that fits as well as the trend of a fit."""
+    """Clause on a second state of long slip distance, which fits as well as the trend of a fit."""
     before = weakening(fit.rig(0), fit.values)
     return (
         f"{_asked(fit, one)} in place of the trend fits as well (BIC {-one.gain:+.1f}), with {WEAKENING} "
         f"{one.values[WEAKENING]:.2g} in place of {before:.2g}: these data do not determine a - b; slide further after "
-        "each step, or give (fix) what is known of b"
+        "each step, or give (fix) known values of b"
     )
 
 
 def _rivals(fit: FitNumbers, best: Remedy) -> str:
-    """Clause on other models that the records hardly tell from the best of those that were tried."""
+    """Clause on other models between which and the best one the records hardly distinguish."""
     near = _near(fit, best)
     said = [
         f"{_asked(fit, one)} (BIC {abs(best.gain - one.gain):.1f} {'less' if one.gain > best.gain else 'more'}, "
-        f"{', '.join(_moved(fit, one)) or 'the rest alike'})"
+        f"{', '.join(_moved(fit, one)) or 'other values alike'})"
         for one in near
     ]
-    return f" hardly told from that: {enumerated(said)};" if near else ""
+    return f" hardly distinguished from it: {enumerated(said)};" if near else ""
 
 
 def _consequence(fit: FitNumbers, best: Remedy) -> str:
-    """What a better model means for the values: whether it moves one by more than its error, or gives one none."""
+    """Clause on the use of the fitted values, depending on whether a better model moves one by more than its error."""
     choices = [one.choice for one in (best, *_near(fit, best))]
     if all(any(f"fit.{word} =" in choice for choice in choices) for word in ("trend", "states")):
         return (
@@ -307,7 +307,7 @@ def _consequence(fit: FitNumbers, best: Remedy) -> str:
 
 
 def _asked(fit: FitNumbers, one: Remedy) -> str:
-    """What to ask for, with the values of what it adds."""
+    """Settings of another model, with the fitted values of its further parameters."""
     units = {name.rpartition(".")[2]: address.role.unit for name, address in fit.plan.rig.parameters().items()}
     units |= {"lag": "s"}
     added = []
@@ -319,7 +319,7 @@ def _asked(fit: FitNumbers, one: Remedy) -> str:
 
 
 def _moved(fit: FitNumbers, one: Remedy) -> list[str]:
-    """Relative changes of the parameters of the law and of the stiffness, and a − b beside that of the fit."""
+    """Relative changes of the parameters of the law and of the stiffness, and a − b compared with that of the fit."""
     own = weakening(fit.rig(0), fit.values)
     levels = [] if own is None or WEAKENING not in one.values else [
         f"{WEAKENING} {one.values[WEAKENING]:.2g} in place of {own:.2g}"
@@ -334,33 +334,33 @@ def _shares(fit: FitNumbers, one: Remedy) -> list[str]:
 
 
 def _equal_memories(fit: FitNumbers) -> str:
-    """Clause on the memories of normal stress with which the fit is as good, of a law that has none."""
+    """Clause on memories of normal stress with which the fit is as good, for a law without a memory."""
     if not fit.remedies:
-        return "residuals are noise, and with the memories that were tried the fit is worse, which speaks for none"
+        return "residuals are noise, and the fit is worse with the memories that were tried, which speaks against them"
     before = weakening(fit.rig(0), fit.values) or 0.0
     best = max(fit.remedies, key=lambda one: abs(one.values.get(WEAKENING, before) - before))
     after = best.values.get(WEAKENING, before)
     sign = ", so that not even its sign is determined" if before * after < 0 else ""
-    taken = "it takes that to be none; " if forgets_changes(fit.plan) else ""
+    taken = "it assumes that there is none; " if forgets_changes(fit.plan) else ""
     return (
         f"{taken}the record is fitted as well with {_asked(fit, best)}, where a - b is {after:.2g} "
-        f"in place of {before:.2g}{sign}, {', '.join(_shares(fit, best))}; ask for that with --set (lab_rig in Python)"
+        f"in place of {before:.2g}{sign}, {', '.join(_shares(fit, best))}; set it with --set (lab_rig in Python)"
     )
 
 
 def _open_memory(fit: FitNumbers) -> list[str]:
-    """What would tell a memory of normal stress that is open."""
+    """Warning with advice on how to determine a memory of normal stress that the records leave open."""
     lost = {name for one in fit.unidentified for name in one.weights if "normal_memory." in name}
     if not lost:
         return []
     if not any(record.stress_changes for record in fit.plan.records):
         return [
-            f"without a change of the normal stress nothing tells {enumerated(sorted(lost))}: leave the memory out, "
-            "give (fix) what is known of it, or fit a record with steps of the normal stress of the same rock along"
+            f"without a change of the normal stress nothing determines {enumerated(sorted(lost))}: leave the memory "
+            "out, give (fix) known values, or also fit a record with steps of the normal stress on the same rock"
         ]
     return [
-        f"changes of normal stress alone do not tell {enumerated(sorted(lost))} from the rest of the law: fit a record "
-        "with steps of velocity of the same rock along, or give (fix) what is known of the memory"
+        f"changes of normal stress alone do not separate {enumerated(sorted(lost))} from the rest of the law: also fit "
+        "a record with steps of velocity on the same rock, or give (fix) known values of the memory"
     ]
 
 
@@ -376,7 +376,7 @@ def _drained_at_once(fit: FitNumbers) -> list[str]:
 
 
 def _alike(fit: FitNumbers, tried: tuple[RampFit, ...]) -> list[RampFit]:
-    """Those that fit nearly as well as the best."""
+    """Fits with ramps that are nearly as good as the best of them."""
     least = min(one.ssq for one in tried)
     return [one for one in tried if one.ssq < least * fit.nearly]
 
@@ -401,7 +401,7 @@ def drive_line(fit: FitNumbers) -> str:
     """Text on the loading of the model, and on its effect on a, b and k."""
     plan = fit.plan
     if plan.protocol is not None:
-        return f"the protocol that was given, from {own_rate(fit)} on"
+        return f"the given protocol, from {own_rate(fit)} on"
     if plan.drive == "measured":
         return "load point and normal stress as measured, noise included"
     loads = [loading.load for loading in plan.loading if loading.load is not None]
@@ -422,9 +422,9 @@ def drive_line(fit: FitNumbers) -> str:
         servo = _servo(course)
         text += f"{servo} in {record.source}" if servo and len(loads) > 1 else servo
     if any(one.parameter == "start.hold" for one in fit.space.unknowns):
-        text += "; at rest at first, how long is fitted (start.hold)"
+        text += "; at rest at first, for a fitted time (start.hold)"
     if plan.initial == "free" and any(one.parameter.startswith("initial.") for one in fit.space.unknowns):
-        text += "; not steady at first, how far is fitted (initial)"
+        text += "; not steady at first, by fitted differences (initial)"
     if plan.beginnings:
         text += "; at first as the step before left friction"
     slips, glitches = sum(c.slips for c in loads), sum(c.glitches for c in loads)
@@ -460,13 +460,13 @@ def _servo(course: Course) -> str:
 
 
 def _steep_names(rig: Slider) -> tuple[str, ...]:
-    """Names of the parameters that a noisy displacement changes most."""
+    """Names of the parameters on which noise of a displacement has most effect."""
     kinds = ("direct effect", "evolution effect", "stiffness")
     return tuple(name for kind in kinds for name in rig.of_kind(kind))
 
 
 def as_dict(fit: FitNumbers) -> dict[str, Any]:
-    """Data of a fit for JSON, in SI units; None for what does not exist."""
+    """Data of a fit for JSON, in SI units; None for numbers that do not exist."""
     return fitted_dict(fit) | {
         "derived": {one.name: estimate_dict(one) for one in fit.derived},
         "driven_by": drive_line(fit),

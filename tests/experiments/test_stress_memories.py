@@ -18,7 +18,7 @@ import stress_steps_at_random as random_steps
 from steadyslip.experiments.answers.laws import with_law
 from steadyslip.experiments.fitting import memories, numbers, remedies
 from steadyslip.experiments.fitting.effort import Budget
-from steadyslip.experiments.fitting.memories import Rival, opened
+from steadyslip.experiments.fitting.equal_minima import EqualMinimum, opened
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.spec import spec_from_text
 
@@ -291,7 +291,7 @@ def test_a_memory_of_equal_fit_widens_the_intervals_of_what_it_moves_by_some_err
     fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300), starts=9)
     own = np.sqrt(np.diag(fit.covariance))
     moved = 3 * own * (np.arange(len(own)) == 0)
-    covariance, found = opened(fit.space, fit.covariance, [Rival(None, fit.space, f * moved) for f in (1.0, 0.5)])
+    covariance, found = opened(fit.space, fit.covariance, [EqualMinimum(fit.space, f * moved) for f in (1.0, 0.5)])
     wider = np.sqrt(np.diag(covariance))
     assert 1.96 * wider[0] > 3 * own[0]
     assert wider[1:] == pytest.approx(own[1:])

@@ -11,10 +11,11 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.version import version
 from steadyslip.experiments.fitting.comparison import Comparison, DataComparison
+from steadyslip.experiments.fitting.equal_minima import AS_GOOD, EqualMinimum, ends_beside, opened
 from steadyslip.experiments.fitting.estimates import combinations, prior_information, whole_covariance
 from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.search import SearchSummary, times_of_changes
+from steadyslip.experiments.fitting.search import MIN_GAIN, SearchSummary, times_of_changes
 from steadyslip.experiments.fitting.valleys import along_open, along_valleys
 from steadyslip.experiments.loading.loading import raised, shifted
 from steadyslip.experiments.numerics.noise import STRUCTURE, Noise, describe, white, whiteness
@@ -98,11 +99,13 @@ def _is_minimum(
 
 def fit_with_errors(
     made: type[F], plan: Any, comparison: Any, z: Array, search: SearchSummary, errors: str,
-    bounds: tuple[Array, Array],
+    bounds: tuple[Array, Array], ends: Array | None = None,
 ) -> F:  # fmt: skip
     """Fit of the class `made` at the coordinates (p,) of a minimum, with errors, noise and what is not determined.
 
     No errors where few of many starts lead to it and structure is left in the residuals: a better one may be missed.
+    Where other starts ended, `ends` (m, p), may be minima that fit as well: what differs in them is not determined. A
+    better one takes the place of the minimum.
     """
     r, jacobian = comparison.residuals(z[None])
     residuals, rows = r[0], jacobian[0]
@@ -133,14 +136,28 @@ def fit_with_errors(
             covariance = np.diag(np.full(free, np.inf))
     ssq, near = float(residuals @ residuals), np.empty((0, free))
     if search.converged:
-        covariance, opened, near = along_valleys(plan, comparison, z, bounds, information, covariance)
-        undetermined += opened
+        ends = np.empty((0, free)) if ends is None else ends
+        covariance, by_valley, near = along_valleys(plan, comparison, z, bounds, information, covariance)
+        undetermined += by_valley
         if undetermined:
             names = [one.name for one in comparison.space.unknowns]
             held = names.index(next(iter(undetermined[0].weights)))
             variance = max(noise.inflation * float(noise.covariance[0]) for noise in noises)
             covariance, others = along_open(plan, comparison, z, bounds, covariance, held, variance)
             near = np.concatenate([near, others])
+        worth = sum(
+            (where.stop - where.start) / max(n.inflation, 1.0)
+            for n, where in zip(noises, comparison.slices, strict=True)
+        )
+        beside = ends_beside(comparison, z, ends, bounds, covariance, ssq * float(np.exp(AS_GOOD / worth)))
+        if len(beside.ssq) and beside.ssq[0] < ssq * (1 - MIN_GAIN):
+            search = replace(search, arrived=1, converged=bool(beside.converged[0]))
+            others = np.vstack([z, beside.coordinates[1:]])
+            return fit_with_errors(made, plan, comparison, beside.coordinates[0], search, errors, bounds, others)
+        equal = [EqualMinimum(comparison.space, own - z) for own in beside.coordinates]
+        covariance, by_minima = opened(comparison.space, covariance, equal)
+        undetermined += by_minima
+        near = np.concatenate([near, beside.coordinates])
     found = made(plan, z, ssq, search, tuple(noises), covariance, undetermined, bounds, version())
     whole = whole_covariance(information + scale * known, spread + scale**2 * known)
     return found.with_open(whole, near).with_memories()

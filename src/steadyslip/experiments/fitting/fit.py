@@ -207,7 +207,9 @@ def search_fit(
                 break
             last = plan.width or 0.0
             found = find_minimum(plan, starts, allowed, progress)
-    fit = fit_with_errors(Fit, plan, found.comparison, found.coordinates, found.summary, errors, found.bounds)
+    fit = fit_with_errors(
+        Fit, plan, found.comparison, found.coordinates, found.summary, errors, found.bounds, found.ends
+    )  # fmt: skip
     wavy = any(WAVE in note for record in plan.records for note in record.notes)
     if wavy and plan.drive == "commanded" and not plan.beginnings and fit.whiteness.p < STRUCTURE:
         moving = options | {"drive": "smoothed", "initial": "free"}  # a load point in a wave slides steadily nowhere

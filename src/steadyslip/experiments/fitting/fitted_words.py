@@ -30,7 +30,8 @@ def quality(fit: Fitted) -> list[str]:
         else f", fewer than {enough}: there may be a better minimum, search with more (starts)"
     )  # fmt: skip
     if search.others:
-        reached += f"; {len(search.others)} other minima, the next {search.others[0]:.4g} times as bad"
+        minima = "minima" if len(search.others) > 1 else "minimum"
+        reached += f"; {len(search.others)} other {minima}, the next {search.others[0]:.4g} times as bad"
     return [
         f"whiteness       {_whiteness(fit)}",
         f"errors          one standard deviation, {independent}",
@@ -64,7 +65,10 @@ def fitted_warnings(fit: Fitted) -> list[str]:
         found.append("the search was stopped before it ended: the numbers are rough and have no errors")
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
-        found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); compare both")
+        found.append(
+            f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares): other values follow the "
+            "records nearly as well; give (fix) what is known, or fit a record with more changes along"
+        )
     return found + (list(fit.at_bounds) if fit.search.converged else [])
 
 

@@ -15,47 +15,27 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.effort import Budget, Effort
-from steadyslip.experiments.fitting.estimates import LEAST_CHANGE, Combination, combination, is_time
+from steadyslip.experiments.fitting.equal_minima import AS_GOOD, NEAR, EqualMinimum
 from steadyslip.experiments.fitting.growing import stress_alone
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, WEAKENING, Remedy, remedy, weakening, with_words
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, remedy, with_words
 from steadyslip.experiments.fitting.search import ROUGH_PATIENCE
-from steadyslip.experiments.fitting.starts import features_of, of_other_sign, search_bounds
-from steadyslip.experiments.fitting.unknowns import Space
+from steadyslip.experiments.fitting.starts import features_of, search_bounds
 from steadyslip.experiments.numerics.least_squares import LOST, Minima, minimise
 
 SIZES = (0.5, 1.0, 1.5, 2.5)  # natural sizes of a memory that are tried: α .1 to .5, as laboratories find
-AS_GOOD = 3.84  # rise of −2 log likelihood up to which a fit is as good: 95 %
-FAR = 4.0  # errors by which a memory moves what is then not determined: its error is less than half of what it must be
-NEAR = 1.0  # errors from which it widens an interval; less makes one wider by less than an eighth
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
-    """Minimum with a memory of normal stress of one size, which fits as well as none.
+class Rival(EqualMinimum):
+    """Minimum with a memory of normal stress of one size, which fits as well as the law without it.
 
     Attributes
     ----------
     remedy : Remedy
-    space : Space
-        Unknowns of the law with the memory.
-    moved : ndarray (p,)
-        Its coordinates less those without a memory.
     """
 
     remedy: Remedy
-    space: Space
-    moved: Array
-
-    def shift(self, space: Space) -> Array:
-        """Coordinates (p,) of the unknowns without a memory, less those without it; 0 for times."""
-        moved = {u.name: x for u, x in zip(self.space.unknowns, self.moved, strict=True) if not is_time(u)}
-        return np.array([moved.get(u.name, 0.0) for u in space.unknowns])
-
-    def far(self, space: Space, deviations: Array, errors: float = FAR) -> Array:
-        """Mask (p,) of the unknowns without a memory that it moves by more than so many errors, if they have any."""
-        own = np.abs(self.shift(space))
-        return np.asarray((own > LEAST_CHANGE) & ((own > errors * deviations) | ~np.isfinite(deviations)))
 
 
 def forgets_changes(plan: Plan) -> bool:
@@ -98,24 +78,6 @@ def equal_memories(
     return sorted(found, key=lambda one: -one.remedy.gain)
 
 
-def other_sign(plan: Plan, ssq: float, coordinates: Array, independent: float) -> list[Rival]:
-    """Minimum in which a - b has the other sign and which fits as well, where only the normal stress changes."""
-    space, most = plan.space(), ssq * float(np.exp(AS_GOOD / independent))
-    begin = of_other_sign(space, coordinates[None]) if stress_alone(plan) else coordinates[None][:0]
-    if not len(begin):
-        return []
-    budget = Budget.of_fit(sum(map(len, plan.records)), len(space))
-    comparison = plan.for_trial().comparison(Effort(patience=ROUGH_PATIENCE, budget=budget))
-    low, high = search_bounds(comparison.parts, features_of(comparison.parts), space)
-    ends = minimise(
-        lambda x, _: comparison.residuals(x), np.clip(begin, low, high), low, high, stop=budget.part(np.inf), known=most
-    )
-    own = weakening(plan.rig, dict(zip((u.name for u in space.unknowns), space.values(coordinates), strict=True)))
-    equal = ends.coordinates[ends.ssq < most]
-    rivals = [Rival(remedy(plan, plan, comparison, z, ssq, len(space)), space, z - coordinates) for z in equal]
-    return [one for one in rivals if own is not None and one.remedy.values[WEAKENING] * own < 0]
-
-
 def _with_memory(plan: Plan, form: Sequence[str]) -> Iterator[Plan]:
     """Plans with each memory of normal stress; `form` are words of an evolution law, none for the plan's own."""
     for words in product(*plan.rig.friction.decided_by_stress.values()):
@@ -153,38 +115,4 @@ def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float], most
             return  # hardly any memory: noise, in which none is as good
     instant = np.any(distances & (ends.coordinates <= low), axis=1)  # over before the next sample: no memory
     for z in ends.coordinates[(ends.ssq < most) & ~instant]:
-        yield Rival(remedy(plan, own, comparison, z, ssq, len(plan.space())), space, z - here)
-
-
-def opened(space: Space, covariance: Array, rivals: list[Rival]) -> tuple[Array, tuple[Combination, ...]]:
-    """Covariance (p, p) that allows for memories of equal fit, and the combination that they leave open.
-
-    The 95 % interval of what the furthest moves reaches as far as it does; what it moves far beyond has no error.
-
-    Parameters
-    ----------
-    space : Space
-        Unknowns of the law without a memory.
-    covariance : ndarray (p, p)
-        Of their coordinates.
-    rivals : list of Rival
-    """
-    deviations = np.sqrt(np.diag(covariance))
-    lost, best = np.zeros(len(space), dtype=bool), (-np.inf, 0.0)
-    found: tuple[Combination, ...] = ()
-    own = [u.name for u in space.unknowns]
-    for one in rivals:
-        far = one.far(space, deviations)
-        lost |= far
-        names = {name for name, is_far in zip(own, far, strict=True) if is_far}
-        inside, added = (np.array([u.name in some for u in one.space.unknowns]) for some in (names, own))
-        reach = (-len(one.space), float(np.linalg.norm(one.moved[inside])))  # of the simplest memory, the furthest
-        if names and reach > best:
-            direction = np.where(inside | ~added, one.moved, 0.0)
-            best, found = reach, (combination(direction, float(np.linalg.norm(direction)), one.space, direction != 0),)
-    shifts = [np.where(lost | ~np.isfinite(deviations), 0.0, one.shift(space)) for one in rivals]
-    furthest = max(shifts, key=lambda s: float(np.max(np.abs(s) / deviations)), default=np.zeros(len(space)))
-    wider = covariance + np.outer(furthest, furthest) / AS_GOOD
-    wider[lost, :] = wider[:, lost] = 0.0
-    wider[lost, lost] = np.inf
-    return wider, found
+        yield Rival(space, z - here, remedy(plan, own, comparison, z, ssq, len(plan.space())))

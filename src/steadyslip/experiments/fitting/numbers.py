@@ -13,10 +13,11 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.derived import DERIVED, Minimum, derived_estimates, derived_values, joint_errors
+from steadyslip.experiments.fitting.equal_minima import opened
 from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.growing import stress_alone
-from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes, opened, other_sign
+from steadyslip.experiments.fitting.memories import Rival, equal_memories, forgets_changes
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.refit import RampFit, driven_as_measured, with_ramps
 from steadyslip.experiments.fitting.remedies import (
@@ -133,8 +134,13 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return replace(self, joint=self._joint(replace(self._minimum, covariance=covariance), self.covariance, near))
 
     def _joint(self, minimum: Minimum, covariance: Array, near: Array) -> dict[str, float]:
-        """Errors, by `minimum`, of what follows from parameters that have none in a covariance (p, p)."""
+        """Errors, by `minimum`, of what follows from parameters that have none in a covariance (p, p).
+
+        None where the rate does not change: only friction at two rates shows a - b without a and b.
+        """
         rigs, lost = [part.rig for part in self.comparison.parts], replace(minimum, covariance=covariance).lost
+        if stress_alone(self.plan):
+            return {}
         near = np.vstack([minimum.coordinates, near])
         return joint_errors(minimum, rigs, self.plan.calibrated, lost, near) if lost else {}
 
@@ -149,8 +155,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         if not ((forgets or stress_alone(self.plan)) and self.search.converged) or self.whiteness.p < STRUCTURE:
             return self
         rivals = self._equal_memories()
-        turned = other_sign(self.plan, self.ssq, self.coordinates, self._independent)
-        if not (rivals or forgets or turned):
+        if not (rivals or forgets):
             return self
         other = forgets and mended(self.plan, self.ssq, self.values)
         better = remedies(self.plan, self.ssq, self.values, 1) if other else ()
@@ -159,7 +164,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
             same.__dict__["remedies"] = better
             return same
         equal = [one for one in rivals if one.remedy.gain < STRONG_EVIDENCE]
-        equal = (equal if len(equal) == len(rivals) else []) + turned
+        equal = equal if len(equal) == len(rivals) else []
         covariance, found = opened(self.space, self.covariance, equal)
         near = self.coordinates + np.array([one.shift(self.space) for one in equal]).reshape(-1, len(self.space))
         same = replace(self, covariance=covariance, unidentified=self.unidentified + found,

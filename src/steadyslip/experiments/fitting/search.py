@@ -99,6 +99,8 @@ class SearchResult:
     summary : SearchSummary
     bounds : (ndarray, ndarray)
         Lower and upper bounds of the coordinates, each (p,).
+    ends : ndarray (m, p)
+        Where other starts ended, the best first: perhaps in minima that fit as well.
     """
 
     coordinates: Array
@@ -106,6 +108,7 @@ class SearchResult:
     comparison: Comparison
     summary: SearchSummary
     bounds: tuple[Array, Array]
+    ends: Array
 
 
 SearchCache = dict[tuple[tuple[str, ...], int, bool, str], SearchResult | None]
@@ -170,7 +173,7 @@ def find_minimum(
     if stress_alone(plan):
         found = first_computable(search.whole, search.with_other_sign(found))
     best, ssq = with_states_sorted(search.whole, found)
-    return SearchResult(best, ssq, search.whole, search.summary(found), (search.low, search.high))
+    return SearchResult(best, ssq, search.whole, search.summary(found), (search.low, search.high), search.ends(found))
 
 
 def _suspects(plan: Plan) -> str:
@@ -344,6 +347,11 @@ class _Search:
         """
         begin = of_other_sign(self.whole.space, found.coordinates[:1])
         return (found + self._refine_from(np.clip(begin, self.low, self.high))).sorted() if len(begin) else found
+
+    def ends(self, found: Minima) -> Array:
+        """Coordinates (m, p) of other ends, on all samples and of the first stage, the best of each first."""
+        others = [own.distinct(FINALISTS)[0] for own in (found, self.rough)]
+        return sort_states(np.concatenate(others)[1 : FINALISTS + 1], self.whole.space)
 
     def _can_compete(self, model: NestedModel) -> bool:
         """True if a nested model, on few samples and from few starts, comes near the best sum of squares."""

@@ -53,7 +53,9 @@ def weighed_by_residuals(alike: Plan, plan: Plan, found: SearchResult, effort: E
         if not np.isfinite(ends.ssq[0]):
             break
         summary = replace(found.summary, converged=bool(ends.converged[0]), iterations=int(ends.iterations[0]))
-        found = SearchResult(ends.coordinates[0], float(ends.ssq[0]), comparison, summary, found.bounds)
+        found = SearchResult(
+            ends.coordinates[0], float(ends.ssq[0]), comparison, summary, found.bounds, found.ends
+        )  # fmt: skip
         plan = own
     return plan, found
 

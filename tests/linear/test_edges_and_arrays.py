@@ -7,6 +7,8 @@ import pytest
 
 import steadyslip as ss
 from rigs_of_theory import D_C, SIGMA, V0, A, B, rate_state, rig
+from steadyslip.linear.search import SPLIT, Search
+from steadyslip.linear.status import status_where_counted
 
 
 def test_edge_values_invert_the_closed_forms():
@@ -28,6 +30,24 @@ def test_edge_values_invert_the_closed_forms():
             assert low <= edge.value <= high
             growth = ss.growth_rate(r, {name: np.array([edge.value * (1 - 1e-6), edge.value * (1 + 1e-6)])})
             assert growth[0] * growth[1] < 0
+
+
+def test_narrowing_ends_between_two_neighbouring_numbers():
+    """A bracket of relative width w has at most w/2⁻⁵³ numbers in it, and each round keeps one part in `SPLIT`."""
+    r, width = rig(friction=rate_state(normal_memory=ss.laws.LinkerDieterich(alpha=0.56)), stiffness=7.8e9), 1e-9
+    (edge,) = ss.boundary(r, "friction.b")
+    scan, rounds = Search(r, "friction.b", (), 0), []
+
+    def status(x):
+        rounds.append(x)
+        return status_where_counted(scan.values(x))
+
+    scan.status = status
+    ends = edge.value * (1 + width * np.array([-0.5, 0.5]))
+    low, high = (end.item() for end in scan._narrowed(*ends[:, None], *status(ends)[:, None]))
+    assert (low, high) == (np.nextafter(high, 0), np.nextafter(low, 1))
+    assert edge.bracket[0] <= low < high <= edge.bracket[1]
+    assert len(rounds) - 1 <= math.ceil(math.log(width * 2**53, SPLIT)) + 1  # one more by rounding of the parts
 
 
 def test_lock_up_edge_and_its_kind():

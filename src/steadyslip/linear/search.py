@@ -324,6 +324,9 @@ class Search:
                 at = np.where(at == 0, SPLIT, at)
                 row = np.arange(len(rows))
                 low[rows], high[rows] = x[row, at - 1], x[row, at]
+                adjacent = np.nextafter(low[rows], high[rows]) == high[rows]
+                if np.all(adjacent & (kind[row, at] != first[:, 0])):  # further rounds would change nothing
+                    break
         return low, high
 
     def _described(self, low: float, high: float, below: Sample, above: Sample) -> Boundary:

@@ -56,7 +56,7 @@ def test_a_protocol_that_the_displacement_contradicts_is_told(given, late, said)
 
 def test_where_no_fit_follows_the_protocol_is_a_suspect():
     """A rate in mm for um: law and drive alone were named."""
-    with pytest.raises(ss.NotAvailable, match=r"are the protocol .*units.* and the law the experiment's"):
+    with pytest.raises(ss.NotAvailable, match=r"are the law and the protocol .*units.* those of the experiment"):
         ss.fit(ss.lab_rig("slip"), record(), protocol=protocol(1e3 * FAST), starts=4)
 
 

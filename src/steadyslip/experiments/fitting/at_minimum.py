@@ -1,4 +1,4 @@
-"""Errors at a minimum: covariance by the noise of the residuals, what is left open, whether it is a minimum at all."""
+"""Errors at a minimum: covariance from the noise of residuals, undetermined parameters, and a test of the minimum."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from steadyslip.experiments.fitting.valleys import along_open, along_valleys
 from steadyslip.experiments.loading.loading import raised, shifted
 from steadyslip.experiments.numerics.noise import STRUCTURE, Noise, describe, white, whiteness
 
-ARRIVED = 0.1  # standard deviations from the minimum, by the next step, within which a search that ended has arrived
+ARRIVED = 0.1  # a stopped search is at the minimum if its next step is shorter than this, in standard deviations
 F = TypeVar("F", bound=Fitted)
 
 
 def loading_shifts(plan: Plan, comparison: Comparison, z: Array) -> Iterator[Array]:
-    """Changes (n,) of the weighted model as an uncertain number of the commanded loading moves by its standard error.
+    """Changes (n,) of the weighted model if an uncertain number of the loading changes by its standard error.
 
-    One array for each of them: levels of normal stress, the measured motion of the load point, settings of its
-    servo, and states at the beginning that are known with an error. None if the loading is not found in the records.
+    There is one array for each number: levels of normal stress, the measured motion of the load point, parameters of
+    its servo, and known initial states. There are none if the loading is not found in the records.
     """
     if not plan.follows:
         return
@@ -57,7 +57,7 @@ def loading_shifts(plan: Plan, comparison: Comparison, z: Array) -> Iterator[Arr
 
 
 def spread_of_gradient(plan: Plan, comparison: Comparison, z: Array, rows: Array, noises: Sequence[Noise]) -> Array:
-    """Covariance (p, p) of Jᵀr, with the derivatives Jᵀ in `rows` (p, n): by noise and by the uncertain loading."""
+    """Covariance (p, p) of Jᵀr for derivatives Jᵀ in `rows` (p, n), due to noise and to the uncertain loading."""
     found = np.zeros((len(z), len(z)))
     for noise, where in zip(noises, comparison.slices, strict=True):
         found += noise.spread(rows[:, where])
@@ -72,8 +72,8 @@ def _is_minimum(
 ) -> bool:  # fmt: skip
     """True if coordinates (p,) where a search ended are a minimum to within `ARRIVED` standard deviations.
 
-    A step of Gauss and Newton is then that short, or its way over a kink: the sum of squares has one where the time of
-    a change passes that of a sample. Such a time is held if the sum rises to both of its sides, the others following.
+    This is so if the next Gauss-Newton step is that short. The sum of squares has kinks where the time of a change
+    equals that of a sample; a time at a kink is held if the sum rises on both sides while the others follow.
     """
     free = (bounds[0] < z) & (z < bounds[1])
     ssq = float(np.sum(comparison.residuals(z[None])[0] ** 2))
@@ -101,11 +101,11 @@ def fit_with_errors(
     made: type[F], plan: Any, comparison: Any, z: Array, search: SearchSummary, errors: str,
     bounds: tuple[Array, Array], ends: Array | None = None,
 ) -> F:  # fmt: skip
-    """Fit of the class `made` at the coordinates (p,) of a minimum, with errors, noise and what is not determined.
+    """Fit of the class `made` at the coordinates (p,) of a minimum, with errors, noise and undetermined parameters.
 
-    No errors where few of many starts lead to it and structure is left in the residuals: a better one may be missed.
-    Where other starts ended, `ends` (m, p), may be minima that fit as well: what differs in them is not determined. A
-    better one takes the place of the minimum.
+    Errors are infinite if few of many starts lead to the minimum and structure is left in the residuals, as a better
+    minimum may have been missed. Other starts ended at `ends` (m, p). If minima there fit as well, parameters that
+    differ between them are not determined; a better minimum there replaces the given one.
     """
     r, jacobian = comparison.residuals(z[None])
     residuals, rows = r[0], jacobian[0]
@@ -123,7 +123,7 @@ def fit_with_errors(
     spread = spread_of_gradient(plan, comparison, z, rows, noises)
     known = prior_information(comparison.space)
     counted = np.maximum(np.diag(information), 1e-300)
-    scale = np.diag(spread) / counted  # variance of the data, as information on each unknown counts it
+    scale = np.diag(spread) / counted  # variance of the data per unit of information on each unknown
     covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
     doubted = search.is_chance and whiteness(residuals[where] for where in comparison.slices).p < STRUCTURE
     if doubted or not search.converged:
@@ -132,7 +132,7 @@ def fit_with_errors(
             comparison, z, bounds, information, rows @ residuals, np.sqrt(np.diag(covariance))
         ):
             search = replace(search, converged=True)
-        else:  # curvature beside the minimum says nothing of errors
+        else:  # the curvature elsewhere than at a minimum gives no errors
             covariance = np.diag(np.full(free, np.inf))
     ssq, near = float(residuals @ residuals), np.empty((0, free))
     if search.converged:

@@ -1,4 +1,4 @@
-"""Minima other than the best that fit the records as well: what differs between them is not determined."""
+"""Other minima that fit the records as well as the best: parameters that differ between them are not determined."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from steadyslip.experiments.fitting.search import ROUGH_ITERATIONS
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
-AS_GOOD = 3.84  # rise of -2 log likelihood up to which a fit is as good: 95 %
-FAR = 4.0  # errors by which a minimum moves what is then not determined: its error is less than half of what it must be
-NEAR = 1.0  # errors from which it widens an interval; less makes one wider by less than an eighth
-APART = 2.5  # errors beyond which an end of the search is not within the errors of the best minimum, with some margin
+AS_GOOD = 3.84  # a fit is as good up to this rise of -2 log likelihood: 95 %
+FAR = 4.0  # a parameter is undetermined if it differs by this number of errors: they are far too small then
+NEAR = 1.0  # smaller differences, in errors, are ignored: they would widen an interval by less than an eighth
+APART = 2.5  # an end of the search is apart from the best minimum if a coordinate differs by this number of errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,21 +27,21 @@ class EqualMinimum:
     Attributes
     ----------
     space : Space
-        Its unknowns.
+        Unknowns of the model that has this minimum.
     moved : ndarray (p,)
-        Its coordinates less those of the best minimum.
+        Differences of its coordinates from those of the best minimum.
     """
 
     space: Space
     moved: Array
 
     def shift(self, space: Space) -> Array:
-        """Change (p,) of the coordinates of a space from the best minimum to this one; 0 for times."""
+        """Differences (p,) of the coordinates in `space` from those of the best minimum; 0 for times."""
         moved = {u.name: x for u, x in zip(self.space.unknowns, self.moved, strict=True) if not is_time(u)}
         return np.array([moved.get(u.name, 0.0) for u in space.unknowns])
 
     def far(self, space: Space, deviations: Array, errors: float = FAR) -> Array:
-        """Mask (p,) of the unknowns of a space that differ by more than so many errors, or have no finite error."""
+        """Mask (p,) of the unknowns in `space` that differ by more than `errors` deviations or have an infinite one."""
         own = np.abs(self.shift(space))
         return np.asarray((own > LEAST_CHANGE) & ((own > errors * deviations) | ~np.isfinite(deviations)))
 
@@ -49,7 +49,7 @@ class EqualMinimum:
 def ends_beside(
     comparison: DataComparison, z: Array, ends: Array, bounds: tuple[Array, Array], covariance: Array, most: float
 ) -> Minima:  # fmt: skip
-    """Minima beyond the errors of the best, from where starts of the search ended; those up to `most`, best first.
+    """Minima outside the errors of the best, with a sum of squares up to `most`, the best first.
 
     Parameters
     ----------
@@ -57,12 +57,13 @@ def ends_beside(
     z : ndarray (p,)
         Coordinates of the best minimum.
     ends : ndarray (m, p)
+        Coordinates where starts of the search ended, from which the minima are searched.
     bounds : tuple of two ndarray (p,)
-        Of the search.
+        Bounds of the search.
     covariance : ndarray (p, p)
-        Of the coordinates at the best minimum.
+        Covariance of the coordinates at the best minimum.
     most : float
-        Sum of squares up to which a minimum fits as well.
+        Largest sum of squares of a minimum that fits as well.
     """
     begin = ends[_apart(comparison.space, ends - z, covariance)]
     if not len(begin):
@@ -73,7 +74,7 @@ def ends_beside(
 
 
 def _apart(space: Space, moved: Array, covariance: Array) -> Array:
-    """Mask (m,) of changes (m, p) of which one is beyond the errors of its coordinate."""
+    """Mask (m,) of differences (m, p) with at least one coordinate beyond `APART` standard deviations."""
     deviations = np.sqrt(np.diag(covariance))
     known = np.isfinite(deviations)
     far = [EqualMinimum(space, one).far(space, deviations, APART) & known for one in moved]
@@ -83,16 +84,17 @@ def _apart(space: Space, moved: Array, covariance: Array) -> Array:
 def opened(
     space: Space, covariance: Array, minima: Sequence[EqualMinimum]
 ) -> tuple[Array, tuple[Combination, ...]]:  # fmt: skip
-    """Covariance (p, p) that allows for equal minima, and the combination of parameters that they leave open.
+    """Covariance (p, p) widened by minima that fit as well, and the combination that they make undetermined.
 
-    The 95 % interval of what the furthest moves reaches as far as it does; what it moves far beyond has no error.
+    The 95 % interval of each parameter includes its value at the minimum that differs most; parameters that differ much
+    more have an infinite variance.
 
     Parameters
     ----------
     space : Space
         Unknowns of the best minimum.
     covariance : ndarray (p, p)
-        Of their coordinates.
+        Covariance of their coordinates.
     minima : sequence of EqualMinimum
     """
     deviations = np.sqrt(np.diag(covariance))
@@ -104,7 +106,7 @@ def opened(
         lost |= far
         names = {name for name, is_far in zip(own, far, strict=True) if is_far}
         inside, added = (np.array([u.name in some for u in one.space.unknowns]) for some in (names, own))
-        reach = (-len(one.space), float(np.linalg.norm(one.moved[inside])))  # of the fewest unknowns, the furthest
+        reach = (-len(one.space), float(np.linalg.norm(one.moved[inside])))  # fewest unknowns, then largest difference
         if names and reach > best:
             direction = np.where(inside | ~added, one.moved, 0.0)
             best, found = reach, (combination(direction, float(np.linalg.norm(direction)), one.space, direction != 0),)

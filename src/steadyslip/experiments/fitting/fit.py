@@ -1,4 +1,4 @@
-"""Fit a rig to records, with starting values from the records and errors of the estimates."""
+"""Fits of rigs to records, with starting values from the records and errors of the estimates."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
-MAX_WIDTHS = 6  # widths of a robust loss that are tried at most
+MAX_WIDTHS = 6  # most widths of a robust loss that are tried
 LEAST_NARROWING = 0.8  # a new width is used if it is below this share of the last; chosen by trial, to save searches
-MIN_GAIN = 1e-6  # least relative decrease of the sum of squares that replaces a minimum; a search is within 1e-7 of it
+MIN_GAIN = 1e-6  # least relative decrease of the sum of squares that replaces a minimum; searches end within 1e-7
 
 
 @checked()  # the options are checked as `FitSettings`, which files use too
@@ -67,83 +67,83 @@ def fit(
 ) -> Any:
     """Fit a rig to one or several records of experiments.
 
-    The model is driven by the loading that was commanded, as found in the record: rates of the load point by robust
-    straight lines, their changes at times that are fitted along, normal stress constant or smooth between its changes.
-    It starts from steady sliding at the first sample; a record that begins at rest, from a hold after such sliding,
-    whose length (``start.hold``) is fitted. Starting values come from the records.
+    The model of a slider is driven by the commanded loading, as found in the record: constant rates of the load point
+    with changes at fitted times, and a normal stress that is constant or smooth between its changes. The motion begins
+    with steady sliding at the first sample. If a record begins at rest, it follows a hold after steady sliding, whose
+    duration (``start.hold``) is fitted. Starting values come from the records.
 
-    A machine is fitted to columns that are named as its runs name them (`experiments.read_motion`), or to frequency
-    responses (`experiments.read_frequency_response`) by what it answers to small waves. It is driven by its drive and
-    the protocol, and its own values are where the search starts. Every column is weighed by its own noise.
+    A machine is fitted to columns of its motions and forces (`experiments.read_motion`), or to frequency responses
+    (`experiments.read_frequency_response`). Its drive and the protocol move it, and the search starts at the values of
+    its parameters. Every column is weighted by its noise.
 
     Parameters
     ----------
     rig : Slider or Machine
-        Its laws, and the values of what is not free. Values of what is free do not matter, but for parameters whose
-        kind no law declares (`steadyslip.core.roles.PARAMETER_KINDS`): these start within a decade of them. Drive
-        velocity and (with a constant contact) normal stress are those of each record.
+        Laws, and values of the parameters that are not free. Values of free parameters only matter for parameters
+        whose kind no law declares (`steadyslip.core.roles.PARAMETER_KINDS`): their search starts within a decade of
+        them. The drive velocity and (for a constant contact) the normal stress are those of each record.
     records : Record, or MotionRecord or ResponseData for a machine, or sequence
-        Fitted together.
+        Records, which are fitted together.
     free : sequence of str, optional
-        Parameters to fit. Unless given, all of the friction law and the stiffness. The level of friction,
-        ``friction.mu_ref``, is free in any case unless it is fixed. With a protocol, times of its pieces too
-        (``protocol.pieces.1.at``). Of a machine name them: any of its parameters and of the protocol.
+        Parameters to fit; by default all of the friction law and the stiffness. The level of friction,
+        ``friction.mu_ref``, is always free unless it is fixed. With a protocol, times of its pieces may be free
+        (``protocol.pieces.1.at``). For a machine they must be given: any of its parameters and of the protocol's.
     fixed : sequence of str, optional
-        Parameters that keep the rig's value.
+        Parameters that keep the value of the rig.
     separate : sequence of str, optional
-        Free parameters that every record has to itself; all others are shared.
+        Free parameters with a separate value in every record; all others are shared.
     drive : str, optional
         ``commanded``: constant rates with steps and ramps between them, as found in the displacement, or a smooth
-        curve where it is not made of straight lines; ``smoothed``: a smooth curve in any case; ``measured``: load
-        point and normal stress exactly as measured at the samples, their noise included.
+        curve if it does not consist of straight lines; ``smoothed``: a smooth curve in any case; ``measured``: load
+        point and normal stress exactly as measured at the samples, including their noise.
     protocol : Protocol, Piece or sequence of Piece, optional
-        What moves the load point, on the records' clock, instead of the measured displacement.
+        Motion of the load point, on the records' clock, in place of the measured displacement.
     trend : int, optional
-        Order of a polynomial that is added to the model's friction, every record's own.
+        Order of a polynomial that is added to the friction of the model, with separate coefficients for each record.
     trend_axis : str, optional
-        What it is a polynomial of: ``displacement`` of the load point, or ``time``.
+        Variable of the polynomial: ``displacement`` of the load point, or ``time``.
     offset : bool, optional
-        Add a constant to friction as well, beside mu_ref.
+        True to add a constant to friction, besides mu_ref.
     lag : bool, optional
-        Let friction come later (or earlier) than what drives it, every record by a time of its own (``lag``) from where
-        its displacement shows the first step: for channels whose filters or clocks differ.
+        True if friction may be recorded later (or earlier) than the loading, as when filters or clocks of channels
+        differ: the time ``lag`` is fitted for each record, from where its displacement shows the first step.
     initial : str, optional
-        ``steady``: a record begins with steady sliding at the first rate and normal stress; ``free``: it slides at that
-        rate but not steadily, and how far friction (``initial.friction``, by the spring's pull) and each memory of it
-        (``initial.Theta``, e-folds of state) are from steady sliding is fitted, each record's own. A record that begins
-        at rest has ``start.hold`` in any case. Of a machine ``free`` are places and velocities of all bodies at the
-        beginning (``initial.table.x``), as of a ring-down.
+        ``steady``: a record begins with steady sliding at the first rate and normal stress. ``free``: it slides at that
+        rate but not steadily; the initial differences from steady sliding of friction (``initial.friction``) and of
+        each memory of it (``initial.Theta``, e-folds of state) are fitted for each record. A record that begins at rest
+        has ``start.hold`` in any case. For a machine, ``free`` fits the initial displacements and velocities of all
+        bodies (``initial.table.x``), as in a ring-down.
     loss : str, optional
-        ``linear`` (least squares), or ``soft-l1``, ``huber``, ``cauchy``, in which outliers weigh less.
+        ``linear`` (least squares), or ``soft-l1``, ``huber``, ``cauchy``, which give outliers less weight.
     width : float, optional
-        Residual at which that begins; 1.345 standard deviations of most residuals unless given.
+        Residual beyond which the weight decreases; by default 1.345 robust standard deviations of the residuals.
     weights : array_like, optional
-        One over each sample's standard deviation, up to a factor; one array for each record. Unless they (or a width)
-        are given, records of unequal noise weigh by their own, its correlation counted, which their residuals tell.
+        Reciprocal of each sample's standard deviation, up to a factor; one array for each record. If neither weights
+        nor a width is given, records with unequal noise are weighted by the noise of their residuals.
     calibrated : float or str, optional
-        Stiffness of the machine from a calibration, Pa/m, to which the fitted one is compared (``k/k_cal``).
+        Stiffness of the machine from a calibration, Pa/m, for comparison with the fitted one (``k/k_cal``).
     errors : str, optional
-        ``auto``: correlation of the residuals is taken into account where it stands out; ``correlated``: always;
+        ``auto``: correlation of the residuals is taken into account if it is noticeable; ``correlated``: always;
         ``independent``: never.
     starts : int, optional
-        Points to start from.
+        Number of starting points of the search.
     effort : float, optional
-        How long the search may last, as a multiple of what nearly always suffices. It is counted in steps of the model,
-        so that it ends alike on every machine; the fit says if it ended so (``fit.search.cut``).
+        Limit on the length of the search, as a multiple of what nearly always suffices. It is counted in steps of the
+        model, so that results are the same on every computer; ``fit.search.cut`` is true if the limit was reached.
     threads : int, optional
-        All cores unless given.
+        Number of threads; by default all cores.
     progress : callable, optional
-        Called with what is being done, the number of starts tried and the root mean square of the residuals reached.
-        There is no fit before the search has ended: Ctrl-C (or KeyboardInterrupt from here) ends without one.
+        Function called with the stage of the search, the number of starts tried and the root mean square of the
+        residuals so far. Ctrl-C (or KeyboardInterrupt raised by it) ends the search without a result.
 
     Returns
     -------
-    Fit, or MachineFit of a machine
+    Fit, or MachineFit for a machine
 
     Raises
     ------
     ParameterError
-        Listing everything that is wrong.
+        If arguments or records are wrong; lists all faults.
     NotAvailable
         If the model cannot follow the records from any start.
 
@@ -170,11 +170,11 @@ def search_fit(
     starts: int = STARTS, effort: float = 1.0, threads: int | None = None, progress: Progress | None = None,
     **options: Any,
 ) -> Fit:  # fmt: skip
-    """Fit a rig to records as `fit` does, without the short refits that are told beside it.
+    """Fit of a rig to records as by `fit`, without the short refits for its text.
 
-    Where a displacement around changes is beside the commanded loading, and friction is not fitted to its noise with
-    the load point that follows it, friction tells if it does: else the sensor has glitches there.
-    So it tells of a wave that repeats with travel.
+    If the displacement around changes is off the commanded loading, two loadings are possible: the load point moved so,
+    or the sensor has glitches there. The fit decides between them by the residuals of friction. The same holds for a
+    displacement with a wave that repeats with travel.
     """
     search: Any = {"errors": errors, "starts": starts, "effort": effort, "threads": threads, "progress": progress}
     plan = make_plan(rig, records, free, errors=errors, starts=starts, effort=effort, **options)
@@ -194,7 +194,7 @@ def search_fit(
                 return search_fit(rig, kept, free, **search, **options)
         if alike:
             plan, found = weighed_by_residuals(alike, plan, found, allowed)
-    else:  # outliers shift the first fit and widen its scatter; the width shrinks as their weight does
+    else:  # outliers shift the first fit and widen its scatter; the width decreases with their weight
         simple = replace(plan, loss="linear")
         found = find_minimum(simple, starts, allowed, progress)
         if alike:
@@ -212,13 +212,13 @@ def search_fit(
     )  # fmt: skip
     wavy = any(WAVE in note for record in plan.records for note in record.notes)
     if wavy and plan.drive == "commanded" and not plan.beginnings and fit.whiteness.p < STRUCTURE:
-        moving = options | {"drive": "smoothed", "initial": "free"}  # a load point in a wave slides steadily nowhere
+        moving = options | {"drive": "smoothed", "initial": "free"}  # a wavy load point never slides steadily
         return _without_structure(fit, lambda: search_fit(rig, records, free, **search, **moving))
     return fit
 
 
 def _without_structure(fit: Fit, other: Callable[[], Fit]) -> Fit:
-    """Another fit, if that leaves no structure in the residuals; it may fail."""
+    """Result of the function `other`, if that fit succeeds and leaves no structure in the residuals; else `fit`."""
     try:
         return found if (found := other()).whiteness.p >= STRUCTURE else fit
     except NotAvailable:
@@ -226,7 +226,7 @@ def _without_structure(fit: Fit, other: Callable[[], Fit]) -> Fit:
 
 
 def _fit_either(rig: Slider, records: Sequence[Record], free: Sequence[str] | None, **options: Any) -> Fit:
-    """Fit along pieces that follow the load point; where that leaves structure or fails, along the better loading."""
+    """Fit with a load point that follows the displacement in pieces or, if that fails, with the better loading."""
     fits, problems = [], []
     for own in ([_followed(record, pieces) for record in records] for pieces in (True, False)):
         try:
@@ -239,19 +239,19 @@ def _fit_either(rig: Slider, records: Sequence[Record], free: Sequence[str] | No
             break
     if not fits:
         raise NotAvailable(
-            "the load point lies beside the commanded steps, ramps or servo around changes, and the model follows "
-            f"friction along neither these nor its own course there: {problems[-1]}"
+            "around changes the displacement is off steps, ramps and the response of a servo, and the model can follow "
+            f"friction neither with these nor with the displacement itself: {problems[-1]}"
         ) from problems[-1]
     return min(fits, key=operator.attrgetter("rms"))
 
 
 def _followed(record: Record, pieces: bool) -> Record:
-    """Record whose load point moves in pieces where its displacement is beside the command, or as it was commanded."""
+    """Record with one of its loadings: in pieces that follow the displacement (if `pieces`), or as commanded."""
     return replace(record, commanded=as_followed(record.loading, pieces))
 
 
 def _without_outliers(plan: Plan, found: SearchResult) -> tuple[Record, ...]:
-    """Records without single samples that are far off the fit: they shift it by many of its errors."""
+    """Records without single samples that are far off the fit, which would shift it by many standard errors."""
     residuals, one = _weighted_residuals(found), found.comparison
     return tuple(
         without_outliers(record, residuals[where]) for record, where in zip(plan.records, one.slices, strict=True)
@@ -265,9 +265,9 @@ def _weighted_residuals(found: SearchResult) -> Array:
 
 
 def refit_from(result: Fit, others: Sequence[Fit]) -> Fit:
-    """Fit of the same model started from the values of other fits, if that is better; else the given fit.
+    """Fit of the same model that starts at the values of other fits, if it is better; else `result` itself.
 
-    Parameters that another fit has too start from its value, the rest from their own.
+    Parameters that another fit does not have start at their value in `result`.
     """
     plan, space = result.plan, result.space
     own = np.array([result.values[name] for name in result.names])

@@ -1,8 +1,8 @@
-"""Memories of normal stress with which a law that has none fits as well: what they change is not determined.
+"""Search for memories of normal stress that fit as well as none: parameters that they change are not determined.
 
-A step of normal stress is answered by the memory (α) and by a, b, d_c and the spring together. A law without a memory
-takes α to be 0, and then tells the others with small errors that hold only if α is 0. Another evolution law may need a
-memory where this one needs none.
+The response to a step of normal stress depends on the memory (α) together with a, b, d_c and the stiffness. A law
+without a memory assumes α = 0 and gives small errors of the others, which hold only if α is 0. Another evolution law
+may need a memory where this one needs none.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from steadyslip.experiments.fitting.search import ROUGH_PATIENCE
 from steadyslip.experiments.fitting.starts import features_of, search_bounds
 from steadyslip.experiments.numerics.least_squares import LOST, Minima, minimise
 
-SIZES = (0.5, 1.0, 1.5, 2.5)  # natural sizes of a memory that are tried: α .1 to .5, as laboratories find
+SIZES = (0.5, 1.0, 1.5, 2.5)  # sizes of a memory that are tried, in natural sizes: α .1 to .5, as in laboratories
 
 
 @dataclass(frozen=True, eq=False)
 class Rival(EqualMinimum):
-    """Minimum with a memory of normal stress of one size, which fits as well as the law without it.
+    """Fit with a memory of normal stress of a given size, which is as good as without a memory.
 
     Attributes
     ----------
@@ -47,20 +47,21 @@ def forgets_changes(plan: Plan) -> bool:
 def equal_memories(
     plan: Plan, ssq: float, values: Mapping[str, float], deviations: Array, independent: float
 ) -> list[Rival]:
-    """Minima with another memory of normal stress held at each of several sizes, that fit as well as the law's own and
-    change more than errors say; of a law that has one only where nothing but the normal stress changes.
+    """Fits with another memory of normal stress, of several sizes, that are as good and change values beyond errors.
+
+    They are searched for laws without a memory; for laws with a memory only if nothing but the normal stress changes.
 
     Parameters
     ----------
     plan : Plan
     ssq : float
-        Sum of squares of the fit of the plan itself.
+        Sum of squares of the fit of the plan.
     values : mapping of str to float
         Values of that fit, by name of the unknown.
     deviations : ndarray (p,)
-        Standard deviations of its coordinates.
+        Standard deviations of the coordinates of that fit.
     independent : float
-        Number of independent samples in its residuals.
+        Number of independent samples in the residuals of that fit.
     """
     if not (forgets_changes(plan) or stress_alone(plan)):
         return []
@@ -68,9 +69,9 @@ def equal_memories(
     others = product(*plan.rig.friction.decided_besides.values())
     found: list[Rival] = []
     laws = [plan.rig.friction]
-    for form in ((), *others):  # its own evolution law first
+    for form in ((), *others):  # the evolution law of the plan first
         if found and max(one.remedy.gain for one in found) < STRONG_EVIDENCE:
-            break  # open already
+            break  # the memory is open
         new = [own for own in _with_memory(plan, form) if own.rig.friction not in laws]
         laws += [own.rig.friction for own in new]
         near = [one for own in new for one in _rivals(plan, own, ssq, values, most)]
@@ -79,7 +80,7 @@ def equal_memories(
 
 
 def _with_memory(plan: Plan, form: Sequence[str]) -> Iterator[Plan]:
-    """Plans with each memory of normal stress; `form` are words of an evolution law, none for the plan's own."""
+    """Plans with each memory of normal stress; `form` names an evolution law (empty: that of the plan)."""
     for words in product(*plan.rig.friction.decided_by_stress.values()):
         own = with_words(plan, [*form, *words])
         if not own.rig.friction.forgets_stress():
@@ -87,7 +88,7 @@ def _with_memory(plan: Plan, form: Sequence[str]) -> Iterator[Plan]:
 
 
 def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float], most: float) -> Iterator[Rival]:
-    """Minima of a plan with a memory from those without; searches that will not get to `most` end early."""
+    """Fits of a plan `own` with a memory, started at the fit without; searches that cannot reach `most` end early."""
     space, addresses = own.space(), own.rig.parameters()
     remembers = tuple(f"friction.{field}." for field in own.rig.friction.decided_by_stress)
     here, idle, tried = (np.zeros(len(space)) for _ in range(3))
@@ -109,10 +110,10 @@ def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float], most
         return minimise(lambda x, _: comparison.residuals(x), begin, low, high, held=held, stop=stop, known=most)
 
     ends = minima(idle + np.outer(SIZES, tried), np.tile(tried != 0, (len(SIZES), 1)))
-    if most < np.min(ends.ssq) < LOST * most:  # perhaps between two sizes
+    if most < np.min(ends.ssq) < LOST * most:  # the best size may lie between two sizes
         ends = minima(ends.sorted().coordinates[:1], None)
         if np.any(np.abs(ends.coordinates[0] - idle)[tried != 0] < SIZES[0]):
-            return  # hardly any memory: noise, in which none is as good
-    instant = np.any(distances & (ends.coordinates <= low), axis=1)  # over before the next sample: no memory
+            return  # hardly any memory, within noise of none
+    instant = np.any(distances & (ends.coordinates <= low), axis=1)  # decays before the next sample: no memory
     for z in ends.coordinates[(ends.ssq < most) & ~instant]:
         yield Rival(space, z - here, remedy(plan, own, comparison, z, ssq, len(plan.space())))

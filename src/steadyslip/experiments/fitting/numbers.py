@@ -1,4 +1,4 @@
-"""Numbers of a fit of a slider: what follows from the estimates (critical stiffness), and short refits beside it."""
+"""Numbers of a slider's fit: derived quantities such as the critical stiffness, and short refits with other models."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from steadyslip.machine.slider import Slider
 
 BEYOND = 3.0  # standard errors by which a fitted time of a change may lie outside its window
 SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
-DIFFERENCE = re.compile(r"^\s*(a\s*[-−]\s*b|b\s*[-−]\s*a)(?=@|\s*$)")  # a less all b, or its negative
+DIFFERENCE = re.compile(r"^\s*(a\s*[-−]\s*b|b\s*[-−]\s*a)(?=@|\s*$)")  # a minus the sum of all b, or its negative
 
 
 @dataclass(frozen=True, eq=False)
 class FitNumbers(Fitted):  # noqa: D101 -- its base has it
     __doc__: str | None = f"""{(Fitted.__doc__ or "").rstrip()}
     joint : mapping of str to float
-        Errors of numbers that follow from parameters of which some are not determined; see `derived.joint_errors`.
+        Errors of derived quantities that depend on undetermined parameters; see `derived.joint_errors`.
     """
 
     plan: Plan
@@ -52,11 +52,11 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return self.plan.comparison()
 
     def __getitem__(self, name: str) -> Estimate:
-        """Estimate of a parameter, or of what follows from them (`derived`); ``b - a`` is the negative of ``a - b``."""
+        """Estimate of a parameter or derived quantity by name; ``b - a`` is the negative of ``a - b``."""
         return self._derived(name) or super().__getitem__(name)
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Confidence interval of a parameter, or of what follows from them, in SI units; see `Fitted.interval`."""
+        """Confidence interval of a parameter or derived quantity in SI units; see `Fitted.interval`."""
         if (one := self._derived(name)) is None:
             return super().interval(name, level)
         share = self._reach(level) / self._reach(0.95)
@@ -65,7 +65,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return low, high
 
     def _derived(self, name: str) -> Estimate | None:
-        """What follows from the parameters, by its name; None for another name."""
+        """Derived quantity of a name; None if no derived quantity has this name."""
         found = DIFFERENCE.sub("a - b", name)
         own = (
             next((one for one in self.derived if one.name == found), None)
@@ -89,21 +89,21 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
 
     @cached_property
     def derived(self) -> tuple[Estimate, ...]:
-        """What follows from them, with errors: ``a - b``, critical stiffness ``k_c`` (Pa/m), ``k/k_c``, ``k/k_cal``."""
+        """Quantities that follow from the parameters: ``a - b``, critical stiffness ``k_c``, ``k/k_c``, ``k/k_cal``."""
         return derived_estimates(self._minimum, [part.rig for part in self.comparison.parts], self.plan.calibrated)
 
     def derived_at(self, coordinates: Array) -> dict[str, Array]:
-        """Values (m,) of what `derived` has at coordinates (m, p), by name; NaN where one does not exist."""
+        """Values (m,) of the quantities in `derived` at coordinates (m, p), by name; NaN if undefined."""
         rigs = [part.rig for part in self.comparison.parts]
         found = derived_values(self.space, rigs, self.plan.calibrated, coordinates)
         return {one.name: found[one.name] for one in self.derived}
 
     @cached_property
     def as_measured(self) -> dict[str, float] | None:
-        """Values that a fit driven by the measured columns, instead of the commanded loading, would have.
+        """Values of a fit driven by the measured columns instead of the commanded loading, by name.
 
-        None where the model does not follow commanded loading, the measured columns have hardly any noise, or the
-        search had not come to its end.
+        None if the model does not follow commanded loading, the measured columns have hardly any noise, or the search
+        was stopped before it ended.
         """
         return None if not self.search.converged else driven_as_measured(self.plan, self.values, self._ends)
 
@@ -114,9 +114,9 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
 
     @cached_property
     def remedies(self) -> tuple[Remedy, ...]:
-        """Short fits with other laws, a lag or a trend, best first, where residuals have structure or one is better.
+        """Short fits with other laws, a lag or a trend, best first, if residuals have structure or one is better.
 
-        Where they have none, those with memories of normal stress that fit as well as none, if the stress changes.
+        Otherwise, if the normal stress changes, short fits with memories of it that are as good as without a memory.
         """
         forgets = forgets_changes(self.plan)
         if self.whiteness.p < STRUCTURE or (
@@ -128,15 +128,15 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return tuple(one.remedy for one in self._equal_memories()) if forgets else ()
 
     def with_open(self, covariance: Array, near: Array) -> Self:
-        """The same fit, with errors of what follows from parameters that have none; see `Fitted.with_open`."""
+        """Fit with errors of derived quantities that depend on undetermined parameters; see `Fitted.with_open`."""
         if not self._minimum.lost or not self.search.converged:
             return self
         return replace(self, joint=self._joint(replace(self._minimum, covariance=covariance), self.covariance, near))
 
     def _joint(self, minimum: Minimum, covariance: Array, near: Array) -> dict[str, float]:
-        """Errors, by `minimum`, of what follows from parameters that have none in a covariance (p, p).
+        """Errors, at `minimum`, of derived quantities of parameters that are undetermined in a covariance (p, p).
 
-        None where the rate does not change: only friction at two rates shows a - b without a and b.
+        There are none if no rate changes: only friction at two rates determines a - b without a and b.
         """
         rigs, lost = [part.rig for part in self.comparison.parts], replace(minimum, covariance=covariance).lost
         if stress_alone(self.plan):
@@ -145,9 +145,10 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return joint_errors(minimum, rigs, self.plan.calibrated, lost, near) if lost else {}
 
     def with_memories(self) -> Self:
-        """The same fit, with wider errors of what a memory of normal stress that fits as well moves, or none if far.
+        """Fit with larger errors of parameters that change if a memory of normal stress is added that fits as well.
 
-        Where one fits better, or another law with one, the text says so, as it does where residuals have structure.
+        Parameters that change much become undetermined. If another memory, or another law with a memory, fits better,
+        the fit is unchanged and `remedies` contains it, as for residuals with structure.
         """
         if self.plan.trend and self.search.converged:
             return self._without_weakening()
@@ -173,9 +174,9 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return same
 
     def _without_weakening(self) -> Self:
-        """The same fit, without b and a - b where a second state of long slip distance fits as well as its trend.
+        """Fit without errors of b and a - b, if a second state of long slip distance fits as well as its trend.
 
-        Where residuals have structure neither is right, and only a state that fits better by strong evidence counts.
+        If residuals have structure, neither is right, and only a state that fits better by strong evidence counts.
         """
         slow = slow_state(self.plan, self.ssq, self.plan, self.values)
         noise = self.whiteness.p >= STRUCTURE
@@ -190,7 +191,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return same
 
     def with_variants(self) -> Self:
-        """The same fit, with the short refits computed that its text tells, so that printing searches nothing."""
+        """Fit with the short refits for its text computed, so that printing it is quick."""
         _ = self.as_measured, self.as_ramps, self.remedies
         return self
 
@@ -227,7 +228,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         if not (self.plan.follows and one.parameter.startswith("step.") and one.parameter.endswith(".at")):
             return ""
         return (
-            f": friction would have the change {when} than the record's other columns allow; the model does not follow "
+            f": by friction the change is {when} than the record's other columns allow; the model does not follow "
             "friction around it (another law, two states, a ramp), or friction was not sampled at the same times"
         )
 
@@ -236,13 +237,13 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         if not (self.plan.follows and one.parameter.startswith("step.") and one.parameter.endswith(".at")):
             return True
         deviation = float(np.sqrt(self.covariance[which, which]))
-        if self.whiteness.p < STRUCTURE:  # where the model is not that of the record, each is a sign of it
+        if self.whiteness.p < STRUCTURE:  # the model may be wrong: then each time at a bound is a sign of it
             return True
         return not np.isfinite(deviation) or abs(float(self._released[which])) > BEYOND * deviation
 
     @cached_property
     def _released(self) -> Array:
-        """Step (p,) of Gauss and Newton from the minimum without bounds, in coordinates."""
+        """Gauss-Newton step (p,) from the minimum without bounds, in coordinates."""
         residuals, jacobian = (own[0] for own in self.comparison.residuals(self.coordinates[None]))
         return np.asarray(np.linalg.lstsq(jacobian @ jacobian.T, -jacobian @ residuals)[0])
 

@@ -28,9 +28,8 @@ from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, HOPE, SA
 from steadyslip.experiments.numerics.noise import SIGNIFICANT, STRUCTURE, lag_one, whiteness
 
 ROUGH_SAMPLES = 400  # samples, over all records, of the first stage
-ROUGH_PATIENCE = (
-    8  # integration steps per sample at most in the first stage; the final stages allow effort.MAX_STEPS_PER_ROW
-)
+ROUGH_PATIENCE = 8
+"""Most integration steps per sample in the first stage; later stages allow `effort.MAX_STEPS_PER_ROW`."""
 ROUGH_GROWTH = 2.0  # first stage: give a motion up after this multiple of the steps of the slowest finished one
 ROUGH_ITERATIONS = 40  # iterations at most in the first stage; its tolerance is loose, so most starts end earlier
 MAX_ITERATIONS = 300  # iterations at most on all samples, or on the condensed ones
@@ -41,7 +40,7 @@ FINALISTS = 8  # ends of the first stage that go on: one per SIMD lane
 NESTED_STARTS = 8  # starts that test whether a nested model can compete: one per SIMD lane
 MAX_POLISHED = 3  # ends on condensed samples that are refined on all samples
 ROUGH_SHARE, REFINE_SHARE = 0.5, 0.8  # shares of the work of one search spent when its first and second stages end
-NESTED_SHARE = 0.2  # share of the work of one search that each nested model may add, besides its own search
+NESTED_SHARE = 0.2  # share of the work of one search that each nested model may add to that of its own search
 REORDER_TOLERANCE = 1e-9  # relative change of the sum of squares by rounding when states are renumbered
 MIN_GAIN = 1e-8  # least relative gain on condensed samples that is worth iterations on all samples
 MIN_CONDENSED_SIZE = 50_000  # elements of the derivatives of all finalists; condensing fewer costs more than it saves
@@ -118,7 +117,7 @@ SearchCache = dict[tuple[tuple[str, ...], int, bool, str], SearchResult | None]
 def _search_or_none(
     plan: Plan, starts: int, effort: Effort, progress: Progress | None, known: SearchCache
 ) -> SearchResult | None:
-    """Search a nested model; None if it cannot follow the records."""
+    """Result of the search for a nested model; None if it cannot follow the records."""
     try:
         return find_minimum(plan, starts, effort, progress, known)
     except NotAvailable:
@@ -130,11 +129,11 @@ def find_minimum(
 ) -> SearchResult:
     """Search for the least sum of squares of a plan.
 
-    The first round tries `FIRST_STARTS` starts, the second, where the normal stress changes, such as follow more and
-    more of the record (`growing`). More rounds follow until several starts agree and the residuals are white noise, or
-    until four times as many as asked for have been tried. Where the model contains simpler (nested)
-    ones, their minima are further starts. When the budget of the search is spent it returns the best minimum so far. A
-    nested model has the budget of a fit of its own, so that it ends where a separate fit of it ends.
+    The first round tries `FIRST_STARTS` starts. If the normal stress and the rate change, the second round follows more
+    and more of the record (`growing`). More rounds follow until several starts agree and the residuals are white noise,
+    or until four times `starts` have been tried. If the model contains simpler (nested) models, their minima are
+    further starts. When the budget of the search is spent, the best minimum so far is returned. A nested model has the
+    budget of a separate fit, so that its search ends where a separate fit ends.
 
     Raises
     ------
@@ -177,10 +176,10 @@ def find_minimum(
 
 
 def _suspects(plan: Plan) -> str:
-    """What to look up where a model cannot follow records."""
+    """Question to the user about probable causes if a model cannot follow the records."""
     if plan.protocol is None:
         return "are law and drive those of the experiment?"
-    return "are the protocol (its rates, units, and times on the clock of the records) and the law the experiment's?"
+    return "are the law and the protocol (its rates, units, and times on the records' clock) those of the experiment?"
 
 
 class _Search:
@@ -198,9 +197,9 @@ class _Search:
     Attributes
     ----------
     rough : Minima
-        Ends of all starts on few samples, those that grow with the record included.
+        Ends of all starts on few samples, including those with a growing part of the record.
     grown : int
-        Number of these.
+        Number of starts with a growing part of the record.
     best : Minima
         Ends of the finalists on condensed samples, or on all samples if none are condensed.
     finalists : ndarray (m, p)
@@ -236,7 +235,7 @@ class _Search:
 
     @property
     def cut(self) -> bool:
-        """True if a stage ended because its work was spent."""
+        """True if a stage ended at its limit of work."""
         return any(stage.was_met for stage in self.stages)
 
     def reporter(self, what: str, among: Comparison) -> Callable[[Minima], None]:
@@ -264,7 +263,7 @@ class _Search:
         self.rough = self.rough + ends
 
     def _of_starts(self) -> dict[str, Any]:
-        """Options of `minimise` for starts on few samples; their stage of work begins."""
+        """Options of `minimise` for starts on few samples; begins their stage of work."""
         self.allowance = self.stages[0]
         return {
             "most": ROUGH_ITERATIONS, "tolerance": 1e-4, "race": MIN_ARRIVED, "stop": self.allowance,
@@ -340,10 +339,10 @@ class _Search:
         return found
 
     def with_other_sign(self, found: Minima) -> Minima:
-        """Add the minimum reached from where a - b has the other sign; the best first.
+        """Add the minimum reached from a start at which a - b has the other sign; the best first.
 
-        Steps of the normal stress alone are followed nearly as well by laws that strengthen as by laws that weaken with
-        velocity, with other memories of normal stress, and starts may all lead to one of them.
+        If only the normal stress changes, laws that strengthen and laws that weaken with velocity fit nearly as well,
+        with different memories of normal stress, and all starts may lead to the same of the two.
         """
         begin = of_other_sign(self.whole.space, found.coordinates[:1])
         return (found + self._refine_from(np.clip(begin, self.low, self.high))).sorted() if len(begin) else found
@@ -369,7 +368,7 @@ class _Search:
         return bool(np.min(ends.ssq, initial=np.inf) <= HOPE * np.min(self.rough.ssq))
 
     def _refine_from(self, begin: Array) -> Minima:
-        """Minimise on condensed samples first, then on all samples those ends that improve on the best."""
+        """Minimise on condensed samples first, then from ends that improve on the best on all samples."""
         if self.condensed is not self.whole:
             known = float(np.min(self.best.ssq))
             ends = minimise(
@@ -380,7 +379,7 @@ class _Search:
         return self._minimise_on_all(begin)
 
     def _minimise_on_all(self, begin: Array) -> Minima:
-        """Minimise on all samples; after condensed samples with few iterations, and more if those do not converge."""
+        """Minimise on all samples: after condensed samples with few iterations, and more if those do not converge."""
 
         def ends(start: Array, most: int, held: Array | None = None) -> Minima:
             report = self.reporter("refining", self.whole)
@@ -394,7 +393,7 @@ class _Search:
             found = (ends(found.coordinates[:1], MAX_ITERATIONS) + found).sorted()
         times = times_of_changes(self.whole.space)
         if len(begin) and np.isfinite(found.ssq[0]) and not found.converged[0] and np.any(times):
-            beside = ends(found.coordinates[:1], MAX_ITERATIONS, times[None])  # a time at a kink keeps all others
+            beside = ends(found.coordinates[:1], MAX_ITERATIONS, times[None])  # a time at a kink stops all others
             beside.converged[:] = False
             found = (ends(beside.coordinates, FINAL_ITERATIONS) + beside + found).sorted()
         return found
@@ -412,9 +411,9 @@ class _Search:
 
 
 def _moved_inside(space: Space, coordinates: Array, low: Array, high: Array) -> Array:
-    """Copies of a point, (0 or more, p), with times that ended at a bound of their window moved inside it.
+    """Copies (0 or more, p) of a point in which times at a bound of their window are moved inside the window.
 
-    Within a sampling interval the misfit need not fall one way only: a time held at an end may hide a better minimum.
+    Within a sampling interval the misfit may have several minima: a time at an end may hide a better one.
     """
     ended = times_of_changes(space) & ((coordinates <= low) | (coordinates >= high))
     if not np.any(ended):
@@ -424,12 +423,12 @@ def _moved_inside(space: Space, coordinates: Array, low: Array, high: Array) -> 
 
 
 def times_of_changes(space: Space) -> Array:
-    """True for unknowns (p,) that are the time or the duration of a change of the loading."""
+    """Mask (p,) of the unknowns that are the time or the duration of a change of the loading."""
     return np.array([one.parameter.startswith(("step.", "jump.")) for one in space.unknowns])
 
 
 def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
-    """True if residuals are correlated, and not as noise that decays is: perhaps because a better minimum exists."""
+    """True if residuals have structure beyond decaying correlation, perhaps because a better minimum exists."""
     r = whole.residuals(coordinates[None])[0][0]
     parts = [r[where] for where in whole.slices]
     if all(abs(lag_one(own)) <= SIGNIFICANT / np.sqrt(len(own)) for own in parts):
@@ -460,9 +459,9 @@ def minima_near(comparison: Comparison, begin: Array, bounds: tuple[Array, Array
 
 
 def with_states_sorted(comparison: Comparison, found: Minima) -> tuple[Array, float]:
-    """Coordinates and sum of squares of the first minimum, its states numbered by rising slip distance.
+    """Coordinates and sum of squares of the first minimum, with its states numbered by rising slip distance.
 
-    The states keep their order where renumbering changes the sum of squares, as rounding does in unstable motions.
+    The states keep their order if renumbering changes the sum of squares, as happens by rounding in unstable motions.
     """
     best, ssq = found.coordinates[0], float(found.ssq[0])
     rising = sort_states(found.coordinates[:1], comparison.space)

@@ -1,7 +1,7 @@
-"""Weights of the records of a joint fit by their own noise.
+"""Weights of the records in a joint fit, from the noise of each record.
 
-Records of unequal noise that weigh alike give larger errors than the quietest of them alone (Aitken 1935). How friction
-scatters from sample to sample gives weights for the search, the residuals that it leaves those of the fit.
+With equal weights, records of unequal noise may give larger errors than the quietest record alone (Aitken 1935). The
+scatter of friction from sample to sample gives weights for the search, and the residuals give those of the final fit.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from steadyslip.experiments.fitting.search import SearchResult, minima_near
 from steadyslip.experiments.numerics.noise import describe
 from steadyslip.experiments.numerics.splitting import displacement_noise, spread
 
-LEAST_RATIO = 1.3  # of noise, below which records weigh alike: weights of two would lessen errors by 3 % at most
-MOST_RATIO = 100.0  # of noise that counts: with it, the noisy one of two adds a ten-thousandth of the information
-MAX_WEIGHINGS = 4  # times that noise is estimated anew at most; two usually suffice
-ALIKE = 0.1  # relative change of noise by which errors change by less than two thousandths
-FAR = 4.0  # robust standard deviations beyond which residuals are left out: outliers tell nothing of noise
+LEAST_RATIO = 1.3  # records have equal weights below this ratio of noise: weights would reduce errors by 3 % at most
+MOST_RATIO = 100.0  # largest ratio of noise in weights: a noisier record then adds 1e-4 of the information
+MAX_WEIGHINGS = 4  # most estimates of the noise; two usually suffice
+ALIKE = 0.1  # weights are final if the noise changes by less than this share: errors then change by less than 0.2 %
+FAR = 4.0  # residuals beyond this number of robust standard deviations are outliers and ignored
 
 
 def weighed_by_scatter(plan: Plan) -> Plan:
-    """Plan of two or more records, weighed by how friction scatters about the line through neighbouring samples."""
+    """Plan of two or more records weighted by the scatter of friction about the line through neighbouring samples."""
     return _weighed(plan, np.array([displacement_noise(one.time, one.friction) for one in plan.records]))
 
 
 def weighed_by_residuals(alike: Plan, plan: Plan, found: SearchResult, effort: Effort) -> tuple[Plan, SearchResult]:
-    """Plan whose records weigh by the noise of their residuals, its correlation counted, and its minimum.
+    """Plan with records weighted by the (correlated) noise of their residuals, and its minimum.
 
     Parameters
     ----------
     alike : Plan
-        Of two or more records that weigh alike.
+        Plan of two or more records with equal weights.
     plan : Plan
-        The same with weights by which its minimum was searched.
+        Same plan with the weights of the search.
     found : SearchResult
-        That minimum, which is followed while weights change.
+        Minimum of `plan`, which is followed while weights change.
     effort : Effort
-        Whose budget this is part of.
+        Limits, with the budget of the whole fit.
     """
     for _ in range(MAX_WEIGHINGS):
         own = _weighed(alike, _noise(alike, found))
@@ -65,17 +65,17 @@ def _weights(plan: Plan) -> tuple[Array, ...]:
 
 
 def _weighed(plan: Plan, noise: Array) -> Plan:
-    """Plan whose records weigh by their noise (records,); the same plan where that hardly differs."""
+    """Plan with records weighted by their noise (records,); the given plan if the noise hardly differs."""
     noise = np.maximum(noise, np.max(noise) / MOST_RATIO)
     if not np.max(noise) > LEAST_RATIO * np.min(noise):
         return plan
     mean = np.average(np.log(noise), weights=[len(record) for record in plan.records])
-    sizes = noise / np.exp(mean)  # so that sums of squares of fits with other weights compare
+    sizes = noise / np.exp(mean)  # makes sums of squares comparable between weights
     return replace(plan, weights=tuple(row / size for row, size in zip(_weights(plan), sizes, strict=True)))
 
 
 def _noise(plan: Plan, found: SearchResult) -> Array:
-    """Standard deviation (records,) of the noise in slow changes, from residuals with the weights of the plan."""
+    """Standard deviation (records,) of the noise of slow changes, from residuals with the weights of the plan."""
     one, weights = found.comparison, np.concatenate(_weights(plan))
     predicted, jacobian = (own[0] for own in one.model(found.coordinates[None]))
     residuals, rows = (one.data - predicted) * weights, jacobian * weights

@@ -344,10 +344,13 @@ def _hopf_line(known: dict[str, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
     names = {key: sp.Integer(0) if value == 0 else inner_symbol(key) for key, value in known.items()}
     numerator, denominator = cubic.hopf_line(**names)
     a2 = cubic.coefficients(**names, k=sp.Integer(0))[2]
-    short = [sp.cancel(part / a2) for part in (numerator, denominator)]
-    if all(part.is_polynomial() for part in short):
-        numerator, denominator = short
+    if a2 == 0:
+        return sp.nan, sp.nan
     point = {symbol: known[key] for key, symbol in names.items() if symbol.is_Symbol}
+    polynomial = sp.ring(list(point), sp.ZZ)[0].from_expr  # `sympy.cancel` gives the same in many times the time
+    parts = [divmod(polynomial(part), polynomial(a2)) for part in (numerator, denominator)]
+    if not any(rest for _, rest in parts):
+        numerator, denominator = (quotient.as_expr() for quotient, _ in parts)
     return numerator.xreplace(point), denominator.xreplace(point)
 
 

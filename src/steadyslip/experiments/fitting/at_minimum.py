@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.equal_minima import AS_GOOD, EqualMinimum, e
 from steadyslip.experiments.fitting.estimates import combinations, prior_information, whole_covariance
 from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.search import MIN_GAIN, SearchSummary, times_of_changes
+from steadyslip.experiments.fitting.search import MIN_GAIN, SearchSummary, jump_left, times_of_changes
 from steadyslip.experiments.fitting.valleys import along_open, along_valleys
 from steadyslip.experiments.loading.loading import raised, shifted
 from steadyslip.experiments.numerics.noise import STRUCTURE, Noise, describe, white, whiteness
@@ -103,9 +103,9 @@ def fit_with_errors(
 ) -> F:  # fmt: skip
     """Fit of the class `made` at the coordinates (p,) of a minimum, with errors, noise and undetermined parameters.
 
-    Errors are infinite if few of many starts lead to the minimum and structure is left in the residuals, as a better
-    minimum may have been missed. Other starts ended at `ends` (m, p). If minima there fit as well, parameters that
-    differ between them are not determined; a better minimum there replaces the given one.
+    Errors are infinite if few of many starts lead to the minimum and structure is left in the residuals, or if
+    residuals jump, as a better minimum may have been missed. Other starts ended at `ends` (m, p). If minima there fit
+    as well, parameters that differ between them are not determined; a better minimum there replaces the given one.
     """
     r, jacobian = comparison.residuals(z[None])
     residuals, rows = r[0], jacobian[0]
@@ -125,7 +125,9 @@ def fit_with_errors(
     counted = np.maximum(np.diag(information), 1e-300)
     scale = np.diag(spread) / counted  # variance of the data per unit of information on each unknown
     covariance, undetermined = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
-    doubted = search.is_chance and whiteness(residuals[where] for where in comparison.slices).p < STRUCTURE
+    doubted = bool(jump_left(comparison, residuals)) or (
+        search.is_chance and whiteness(residuals[where] for where in comparison.slices).p < STRUCTURE
+    )
     if doubted or not search.converged:
         search = replace(search, converged=False)
         if not doubted and _is_minimum(

@@ -17,7 +17,7 @@ from steadyslip.core.options import checked, finite
 from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.experiments.fitting.comparison import DataComparison, scaled_by_loss
 from steadyslip.experiments.fitting.estimates import Combination, Estimate
-from steadyslip.experiments.fitting.search import SearchSummary
+from steadyslip.experiments.fitting.search import SearchSummary, jump_left
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.numerics.noise import Noise, Whiteness, whiteness
 
@@ -153,6 +153,11 @@ class Fitted(ReadOnly):
     def whiteness(self) -> Whiteness:
         """Test of the residuals for structure beyond white noise and noise with exponentially decaying correlation."""
         return whiteness(self.scaled_residuals[where] for where in self.comparison.slices)
+
+    @cached_property
+    def jump(self) -> float:
+        """Largest jump of the residuals in standard deviations of their noise, where it is no noise; else 0."""
+        return jump_left(self.comparison, self.scaled_residuals)
 
     @property
     def samples(self) -> int:

@@ -41,6 +41,8 @@ def quality(fit: Fitted) -> list[str]:
 
 def _whiteness(fit: Fitted) -> str:
     one = fit.whiteness
+    if fit.jump:
+        return f"structure is left: residuals jump by {fit.jump:.0f} standard deviations of their noise"
     verdict = "structure is left" if one.p < STRUCTURE else "noise is left"
     return f"{verdict}: Ljung-Box {one.statistic:.4g} where noise has {one.degrees}, probability {chance(one.p)}"
 
@@ -52,8 +54,14 @@ def chance(p: float) -> str:
 
 def fitted_warnings(fit: Fitted) -> list[str]:
     """Warnings on undetermined parameters and on the search for the minimum, each a sentence."""
-    found = [str(one) for one in fit.unidentified]
-    if fit.search.cut:
+    found = [str(one) for one in fit.unidentified] if fit.search.converged else []
+    if fit.jump:
+        found.append(
+            f"residuals jump by {fit.jump:.0f} standard deviations of their noise, as where a sudden slip of a record "
+            "is not followed, or the model slips where the record does not: the numbers have no errors; search with "
+            "more (starts), or leave out what is beyond that slip (between), in which a machine's mass plays its part"
+        )
+    elif fit.search.cut:
         found.append(_cut_off(fit))
     elif not fit.search.converged and fit.search.is_chance:
         found.append(
@@ -62,7 +70,10 @@ def fitted_warnings(fit: Fitted) -> list[str]:
             "or fit another model"
         )
     elif not fit.search.converged:
-        found.append("the search was stopped before it ended: the numbers are rough and have no errors")
+        found.append(
+            "the search was stopped before it ended: the numbers are rough and have no errors; give it more work "
+            "(effort) or other starts (starts), or hold what is known (fixed)"
+        )
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(

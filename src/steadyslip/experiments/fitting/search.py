@@ -15,7 +15,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
-from steadyslip.experiments.fitting.comparison import Comparison
+from steadyslip.experiments.fitting.comparison import Comparison, DataComparison
 from steadyslip.experiments.fitting.condensed import Condensed, condensed_along
 from steadyslip.experiments.fitting.effort import Effort, work_of_search
 from steadyslip.experiments.fitting.growing import grown, several_changes, stress_alone
@@ -25,7 +25,7 @@ from steadyslip.experiments.fitting.starts import features_of, of_other_sign, se
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.measured.record import transient_rows
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, HOPE, SAME_SSQ, Minima, minimise
-from steadyslip.experiments.numerics.noise import SIGNIFICANT, STRUCTURE, lag_one, whiteness
+from steadyslip.experiments.numerics.noise import SIGNIFICANT, STRUCTURE, lag_one, largest_jump, whiteness
 
 ROUGH_SAMPLES = 400  # samples, over all records, of the first stage
 ROUGH_PATIENCE = 8
@@ -431,9 +431,17 @@ def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
     """True if residuals have structure beyond decaying correlation, perhaps because a better minimum exists."""
     r = whole.residuals(coordinates[None])[0][0]
     parts = [r[where] for where in whole.slices]
+    if jump_left(whole, r):
+        return True
     if all(abs(lag_one(own)) <= SIGNIFICANT / np.sqrt(len(own)) for own in parts):
         return False
     return whiteness(parts).p < STRUCTURE
+
+
+def jump_left(comparison: DataComparison, residuals: Array) -> float:
+    """Largest jump of weighted residuals (n,) in standard deviations of their noise; 0 where no record has one."""
+    data = comparison.data * comparison.weights
+    return max(largest_jump(residuals[where], data[where]) for where in comparison.slices)
 
 
 def first_computable(comparison: Comparison, found: Minima) -> Minima:

@@ -29,10 +29,16 @@ MAX_ORDER = 40  # largest order of the autoregression; above about a tenth of th
 LAGS = 20  # most lags in tests for correlation, in samples; at most a tenth of the samples
 MIN_CHANCE = 1e-3  # innovations of the simple noise model are not white below this probability in such a test
 STRUCTURE = 1e-3  # probability of the whiteness test below which residuals have structure
+JUMP = 10.0
+"""Innovation, in standard deviations of most of them, that is no noise: of 30 fits to records with noise none was
+beyond 4.6, of one that did not follow a slip event the largest was 657."""
+JUMPED = 5  # residuals as large as such an innovation that follow a jump, at least; wild samples are single
+JUMP_SHARE = 0.02  # range of the data, as a share, that such residuals exceed; residuals of exact data are rounding
 FIRST_GUESSES = ((0.5, 0.0), (0.9, 0.7), (0.98, 0.7), (0.0, 0.3))  # candidates for the starting decay and average
 LONGEST = 0.05  # largest correlation between the ends of a record: slower noise looks like a constant
 CURVATURE_STEP = 0.05  # step of finite differences of the likelihood, in artanh of decay and average
 LEAST_CURVATURE = 0.25  # least curvature of the likelihood, for a deviation of 2 at most: beyond, tanh is flat
+MEDIAN_DEVIATION = 0.6745  # median of absolute deviations of Gaussian noise, in standard deviations
 FITTED_RANK = 1e-6  # derivatives are linearly dependent below this ratio of singular values
 VANISHED = 1e-30  # smaller powers are set to 0: they have no effect, and denormal numbers are a hundred times slower
 TAIL = 1e-4  # the autocovariance is continued until it is below this share of the variance
@@ -333,6 +339,21 @@ class Whiteness:
         from scipy.stats import chi2
 
         return float(chi2.sf(self.statistic, self.degrees)) if self.degrees else 1.0
+
+
+def largest_jump(residuals: Array, data: Array) -> float:
+    """Largest innovation of residuals (n,) in standard deviations of most of them, if it is no noise; else 0.
+
+    A sudden slip that the model does not follow makes few innovations so large that the noise with which it is compared
+    in a portmanteau test is all its own: nothing is found then.
+    """
+    innovations = first_order(residuals).innovations if len(residuals) > JUMPED else np.zeros(1)
+    noise = float(np.median(np.abs(innovations - np.median(innovations)))) / MEDIAN_DEVIATION
+    furthest = float(np.max(np.abs(innovations)))
+    limit = max(JUMP * noise, JUMP_SHARE * float(np.ptp(data)))
+    if furthest <= JUMP * noise or np.sum(np.abs(residuals) > limit) < JUMPED:
+        return 0.0
+    return furthest / max(noise, 1e-300)
 
 
 def whiteness(residuals: Iterable[Array]) -> Whiteness:

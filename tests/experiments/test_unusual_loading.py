@@ -10,6 +10,7 @@ import lab_records as lab
 import steadyslip as ss
 from displacements_at_random import KINDS, drawn, outcome
 from servo_records import record as servo_record
+from steadyslip.experiments.fitting.fit import search_fit
 from steadyslip.experiments.loading.across import yielding
 from steadyslip.experiments.loading.kinks import load_course
 
@@ -187,3 +188,17 @@ def test_a_hold_with_a_drifting_sensor_remains_a_hold():
     course = load_course(time, moved + 2e-8 * np.random.default_rng(2).standard_normal(len(time)))
     assert course.levels[1] == 0.0
     assert len(course.changes) == 2
+
+
+@pytest.mark.parametrize("answered", [True, False])
+def test_a_small_step_that_friction_answers_is_none_of_the_sensor(answered):
+    """A step by 20 %: friction of a load point that kept its rate shows none."""
+    step, still = ss.Protocol(pieces=(ss.protocol.VelocityStep(at=30, to=1.2e-6),), until=100), ss.Protocol(until=100)
+    chance = np.random.default_rng(2)
+    source = lab.rig(d_c=5e-6, b=0.013)
+    found = lab.columns(source, step, 1000)
+    found["displacement"] = found["displacement"] + 2e-8 * chance.standard_normal(1000)
+    friction = found["friction"] if answered else lab.columns(source, still, 1000)["friction"]
+    found["friction"] = friction + lab.NOISE * chance.standard_normal(1000)
+    fit = search_fit(ss.lab_rig(), ss.record_from_arrays(**found))
+    assert ("perhaps only waviness" in " ".join(str(fit).split())) is not answered

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ OTHER_UNIT = 20.0  # ratio to the calibrated stiffness from which a unit is wron
 CALIBRATED = 0.1  # smaller relative differences from a calibration are not reported: calibrations are no better
 WAVY = 4.0  # waves are reported if a displacement wanders by this multiple of its sample-to-sample noise
 MOST_FAULTS = 10  # waves are also reported above this number of slips and glitches; real records had up to 5
+SHOWN = 25.0  # rise of -2 log likelihood without a change of rate from which friction shows it: five standard errors
 LISTED = 4  # most changes listed in a warning
 
 
@@ -148,9 +150,9 @@ def _waves(fit: FitNumbers) -> list[str]:
 def _small_changes(fit: FitNumbers) -> list[str]:
     """Warnings on changes of rate that are too small to be commanded and may be waviness of the sensor."""
     found = []
-    for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
+    for i, (record, loading) in enumerate(zip(fit.plan.records, fit.plan.loading, strict=False)):
         changes = () if loading.load is None else loading.load.changes
-        small = [one for one in changes if one.slight]
+        small = [one for k, one in enumerate(changes) if one.slight and not _shown_by_friction(fit, i, k)]
         if small:
             sizes = [f"{format_percent(one.after / one.before - 1)} at {one.time:.5g} s" for one in small[:LISTED]]
             more = [f"{len(small) - LISTED} more"] if len(small) > LISTED else []
@@ -159,6 +161,23 @@ def _small_changes(fit: FitNumbers) -> list[str]:
                 "sensor; if they were not commanded, give the commanded rates as a protocol"
             )
     return found
+
+
+def _shown_by_friction(fit: FitNumbers, record: int, change: int) -> bool:
+    """True if friction is followed much worse by the fit without a change of rate: the load point made it."""
+    load, part = fit.plan.loading[record].load, fit.comparison.parts[record]
+    if not fit.plan.follows or load is None:
+        return False
+    changes = list(load.changes)
+    before = changes[change].before
+    changes[change] = replace(changes[change], after=before)
+    if change + 1 < len(changes):
+        changes[change + 1] = replace(changes[change + 1], before=before)
+    values = np.array(list(fit.values.values()))
+    own, without = part.driven_by(values, [load, replace(load, changes=tuple(changes))]) * part.weights
+    residuals, noise = fit.part(fit.scaled_residuals, record), fit.noise[record]
+    rise = float(np.sum((residuals + own - without) ** 2) - np.sum(residuals**2))
+    return rise > SHOWN * float(noise.covariance[0]) * max(noise.inflation, 1.0)
 
 
 def _stiffness(rig: Slider) -> float:

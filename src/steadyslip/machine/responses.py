@@ -18,6 +18,8 @@ from steadyslip.machine.structure_data import StructureData
 _OF_PHASE = 0.05  # rad; phase error of careful measurements
 MOST_LINES = 2**19
 """Most frequencies of one response; an analyser gives some thousands."""
+_EVEN = 1e-2  # share of a step by which frequencies written with some digits may be off
+_ROUND = 1e-6  # relative error of a step of frequencies written with some digits
 _FEWEST = 8  # fewest frequencies, because the lowest and the highest octave are evaluated separately
 
 
@@ -85,6 +87,20 @@ class ResponseData(Displayed):
         shares = np.mean(own.imag > 3 * error + _OF_PHASE * np.abs(own), axis=0)
         return dict(zip(self.names, map(float, shares), strict=True))
 
+    def step_in_turns(self) -> float:
+        """Step of the frequencies (Hz) over 2π, if they stand in steps of 2π times a round number; else 0.
+
+        Analysers step by a round number of hertz, or its reciprocal, a duration. Numbers of rad/s read as hertz do not.
+        """
+        if not self.source:
+            return 0.0
+        hertz = self.omega / (2 * np.pi)
+        steps = (hertz[-1] - hertz[0]) / (len(hertz) - 1)
+        even = hertz[0] + steps * np.arange(len(hertz))
+        if np.max(np.abs(hertz - even)) > _EVEN * steps or _is_round(steps) or not _is_round(steps / (2 * np.pi)):
+            return 0.0
+        return float(f"{steps / (2 * np.pi):.6g}")
+
     def points(self) -> dict[str, tuple[Array | None, Array | None]]:
         """Unit rows (d,) that select the x and y displacements of each point from `names`; None where not measured."""
         rows = dict(zip(self.names, np.eye(len(self.names)), strict=True))
@@ -113,3 +129,8 @@ class ResponseData(Displayed):
     def __repr__(self) -> str:
         last = self.omega[-1] / (2 * np.pi)
         return f"ResponseData({self.source or 'responses'}, {', '.join(self.names)}, up to {last:.4g} Hz)"
+
+
+def _is_round(step: float) -> bool:
+    """True for a number of up to four digits, or one whose reciprocal is."""
+    return any(abs(float(f"{one:.4g}") - one) < _ROUND * one for one in (step, 1 / step))

@@ -122,15 +122,32 @@ class StructureData(Displayed):
         """Number of degrees of freedom."""
         return len(self.mass)
 
-    def fastest_of_slow(self, least: float) -> float:
-        """Angular frequency of the fastest mode, rad/s, of a structure held in place; 0 where it is above `least`."""
+    def middle_of_slow(self, least: float) -> float:
+        """Angular frequency of the middle mode, rad/s, of a structure held in place; 0 where it is above `least`."""
         from scipy.linalg import eigvalsh  # slow to import
 
         stiff = 0.5 * (self.stiffness + self.stiffness.T)
-        if np.max(np.diag(stiff) / np.diag(self.mass)) > least**2:  # Rayleigh: no more than the fastest squared
+        if np.median(np.diag(stiff) / np.diag(self.mass)) > least**2:  # spares eigenvalues of nearly all
             return 0.0
         squares = eigvalsh(stiff, self.mass)
-        return float(np.sqrt(squares[-1])) if squares[0] > 0 and squares[-1] < least**2 else 0.0
+        middle = squares[len(squares) // 2]
+        return float(np.sqrt(middle)) if squares[0] > 0 and middle < least**2 else 0.0
+
+    def bent(self, row: Array, force: float) -> tuple[float, float]:
+        """Static displacement, m, in a direction `row` (n,) under a force there, N, and angular frequency of its shape.
+
+        The frequency, rad/s, is Rayleigh's quotient of the bent shape; both are 0 where nothing holds the structure.
+        """
+        stiff = 0.5 * (self.stiffness + self.stiffness.T)
+        try:
+            shape = np.linalg.solve(stiff, row * force)
+        except np.linalg.LinAlgError:
+            return 0.0, 0.0
+        energy, inertia = shape @ stiff @ shape, shape @ self.mass @ shape
+        fastest = np.max(np.diag(stiff) / np.diag(self.mass))
+        if not 0 < energy < np.inf or energy < _FREE * fastest * inertia:
+            return 0.0, 0.0
+        return float(row @ shape), float(np.sqrt(energy / inertia))
 
     @cached_property
     def digest(self) -> str:

@@ -29,7 +29,9 @@ from steadyslip.machine.structure_data import StructureData, reduced_once
 _ONE = "give exactly one of matrices, modes and response"
 _DAMPED = 0.1  # damping ratios from here on are reported as doubtful: they were probably given in percent
 _FEEDING = 0.2  # share of frequencies at which a passive structure may seem to feed energy, by measurement errors
-_SLOW = 0.2  # rad/s; doubtful if even the fastest mode is slower: the slowest modes of towers and ships have .1 to 1
+_SLOW = 0.2  # rad/s; doubtful if half of the modes are slower: the slowest modes of towers and ships have .1 to 1
+_HELD = 2 * np.pi * 10  # rad/s; slower motions under a force may be those of a body on soft mounts
+_STRONGEST = 200.0  # m/s; strain is velocity over that of sound: steel yields below 25 m/s, rubber breaks below 100
 _SMALL = 1e-8  # negative eigenvalues of a damping matrix below this share of the largest are rounding of the file
 _UNITS = 'units of length, of mass or force, and of time, as in "mm t s" or "mm N s"'
 
@@ -254,18 +256,41 @@ class StructureBody(Body, name="structure"):
             own = np.linalg.eigvalsh(0.5 * (self.matrices.damping + self.matrices.damping.T))
             if own[0] < -_SMALL * np.max(np.abs(own)):
                 yield "matrices: the damping C feeds some motions (it has negative eigenvalues): is its sign right?"
-            if fastest := self.matrices.fastest_of_slow(_SLOW):
+            if middle := self.matrices.middle_of_slow(_SLOW):
                 yield (
-                    f"matrices: the fastest mode has a period of {format_quantity(2 * np.pi / fastest, 's')}, "
+                    f"matrices: half of the modes have periods from {format_quantity(2 * np.pi / middle, 's')} on, "
                     "slower than any structure: are M and K exchanged, or is the unit of time wrong?"
                 )
         elif self.response is not None:
             wrong = {name: share for name, share in self.response.feeding().items() if share > _FEEDING}
+            if turning := self.response.step_in_turns():
+                steps = f"{self.response.source!r} has frequencies in steps of 2 pi times {turning:g} Hz"
+                remedy = "write frequency [rad/s] at their column, or divide them by 2 pi"
+                yield f"response: {steps}: are they in rad/s? Then {remedy}"
             if wrong:
                 names, most = " and ".join(f"{name}/{name}" for name in wrong), format_percent(max(wrong.values()))
                 what = f"{names} of {self.response.source!r} would feed energy at up to {most} of the frequencies"
                 why = "are signs, phase and unit right? Motion is as exp(+i omega t), in which a structure lags"
                 yield f"response: {what}: {why}"
+
+    def overloaded(self, name: str, force: float) -> str:
+        """Question on a normal force (N) at a point that would break any structure; empty if it would not.
+
+        A structure of frequency ω that a force bends by d is strained as by a vibration of velocity ω d, whatever its
+        size. Units of mm and t read as m and kg leave ω as it is and make d a thousand times too large.
+        """
+        if self.response is not None:
+            return ""
+        along, away = self.rows(name)
+        bent, omega = self.data.bent(away if np.any(away) else along, force)
+        if omega < _HELD or bent * omega < _STRONGEST:
+            return ""
+        bends = f"the normal force of {format_quantity(force, 'N')} would bend it by {format_quantity(bent, 'm')}"
+        far = f"which at its frequency of {format_quantity(omega / (2 * np.pi), 'Hz')} no material withstands"
+        files = "shapes not of modal masses of 1 kg" if self.matrices is None else "matrices not in m, kg and s"
+        if self.matrices is not None and self.units is None:
+            files += ' (then write their units, as in units = "mm t s")'
+        return f"{bends}, {far}: are the {files}, or is the force wrong?"
 
     @property
     def data(self) -> StructureData:

@@ -156,6 +156,10 @@ def _structure_doubts(rig: Rig) -> Iterator[str]:
                 f"contacts.{contact}: its normal stiffness is pressed by motion across, and {end} has none: "
                 "is there a column or degree of freedom y of it?"
             )
+        elif not own_doubts.get(name, ["no structure"]):
+            force = rig.load_of(f"contacts.{contact}.friction") or 0.0
+            if asked := structures[name].overloaded(point, force):
+                yield f"bodies.{name}: at {end} {asked}"
 
 
 def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:

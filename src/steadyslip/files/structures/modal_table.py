@@ -12,12 +12,15 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.names import unfit_name
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile
-from steadyslip.files.structures.table_text import table_text
+from steadyslip.files.structures.table_text import hertz_of, table_text
 from steadyslip.machine.structure_data import StructureData
 
 FREQUENCY, DAMPING, MASS = "frequency", "damping", "mass"
 """Columns: Hz, damping ratio, and modal mass in kg, 1 unless given."""
-_COLUMNS = "frequency (Hz), damping (ratio), perhaps mass (kg), and of each point, as of tip, tip.x and tip.y"
+_COLUMNS = (
+    "frequency (Hz; else as in frequency [rad/s]), damping (ratio), perhaps mass (kg), and of each point, as of tip, "
+    "tip.x and tip.y"
+)
 _AXES = ("x", "y")
 
 
@@ -27,8 +30,9 @@ def read_modes(path: str, folder: Path) -> StructureData:
     Parameters
     ----------
     path : str
-        Text file relative to `folder` (`table_text`), with a header: ``frequency`` (Hz), ``damping`` (ratio), perhaps
-        ``mass`` (kg), and for each point and direction a column such as ``pad.x`` and ``pad.y`` with the mode shapes.
+        Text file relative to `folder` (`table_text`), with a header: ``frequency`` (Hz, or ``frequency [rad/s]``),
+        ``damping`` (ratio), perhaps ``mass`` (kg), and for each point and direction a column such as ``pad.x`` and
+        ``pad.y`` with the mode shapes.
     folder : Path
 
     Raises
@@ -39,6 +43,8 @@ def read_modes(path: str, folder: Path) -> StructureData:
     text = table_text(path, folder, MOST_TEXT)
     table = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
     header = [cell.strip() for cell in table[0]] if table else []
+    units = {i: found for i, name in enumerate(header) if (found := hertz_of(path, name)) is not None}
+    header = [FREQUENCY if i in units else name for i, name in enumerate(header)]
     columns = _numbers(path, header, table[1:])
     if lost := [name for name in (FREQUENCY, DAMPING) if name not in columns]:
         raise UnreadableFile(
@@ -52,7 +58,7 @@ def read_modes(path: str, folder: Path) -> StructureData:
             raise UnreadableFile(
                 path, f"its column {name} has {np.min(values):g}; allowed: {'> 0' if least is None else '>= 0'}"
             )
-    omega = 2 * math.pi * frequency
+    omega = 2 * math.pi * frequency * next(iter(units.values()))
     stiffness, dashpots = np.diag(mass * omega**2), np.diag(2 * damping * mass * omega)
     return StructureData(np.diag(mass), dashpots, stiffness, 0 * stiffness, _points(path, columns), path)
 

@@ -19,7 +19,7 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import QuantityError
 from steadyslip.core.names import unfit_name
 from steadyslip.files.inputs import UnreadableFile, read_bytes
-from steadyslip.files.structures.table_text import table_text
+from steadyslip.files.structures.table_text import hertz_of, table_text
 from steadyslip.machine.responses import MOST_LINES, ResponseData
 
 Complex = NDArray[np.complex128]
@@ -52,8 +52,9 @@ def read_response(path: str, folder: Path, averages: int) -> ResponseData:
     ----------
     path : str
         File relative to `folder`: ``.uff`` or ``.unv`` with functions of type 58; ``.csv`` with columns ``frequency``
-        (Hz), ``tip.x/tip.y real [m/s^2/N]``, the same with ``imag``, or ``magnitude`` and ``phase [deg]``, and
-        perhaps with ``coherence``; ``.mat`` with variables frequency, response, points, unit and perhaps coherence.
+        (Hz, or ``frequency [rad/s]``), ``tip.x/tip.y real [m/s^2/N]``, the same with ``imag``, or ``magnitude`` and
+        ``phase [deg]``, and perhaps with ``coherence``; ``.mat`` with variables frequency, response, points, unit and
+        perhaps coherence.
     folder : Path
     averages : int
         Averages behind the coherence.
@@ -138,9 +139,10 @@ def _from_table(path: str, folder: Path) -> tuple[Array, dict[tuple[str, str], _
         rows = np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1, ndmin=2, max_rows=MOST_LINES + 1)
     except ValueError as error:
         raise UnreadableFile(path, f"below its first line are not only numbers between commas ({error})") from error
-    if not header or header[0] != "frequency" or rows.shape[1:] != (len(header),):
+    factor = hertz_of(path, header[0]) if header else None
+    if factor is None or rows.shape[1:] != (len(header),):
         raise UnreadableFile(path, f"its first line is {','.join(header)[:80]!r}; allowed: frequency and the responses")
-    hertz, found = rows[:, 0], defaultdict[tuple[str, str], _Measured](_Measured)
+    hertz, found = factor * rows[:, 0], defaultdict[tuple[str, str], _Measured](_Measured)
     begun: dict[tuple[str, str], tuple[str, Array, str]] = {}
     for name, column in zip(header[1:], rows.T[1:], strict=True):
         if (match := _COLUMN.fullmatch(name)) is None:

@@ -150,7 +150,10 @@ def test_models_that_nearly_tie_are_both_named(ahead, told):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("errors", "told"), [(0.9, "move by less than their errors"), (1.1, "do not use the values")])
+@pytest.mark.parametrize(
+    ("errors", "told"),
+    [(0.9, "move by less than their errors"), (1.1, "unless other knowledge excludes that, do not use the values")],
+)
 def test_a_model_that_moves_a_less_b_is_told_so(errors, told):
     """It may, where it moves neither a nor b by its error: that of a - b is far smaller."""
     fit = replace(lab.stepped())

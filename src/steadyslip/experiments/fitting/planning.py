@@ -197,9 +197,10 @@ def check_records(plan: Plan) -> None:
             problems.append(Problem(where, f"{record.source} has no column for the load point's displacement or rate; "
                                     "name it, or give the protocol of the experiment"))  # fmt: skip
         elif plan.protocol is None and not (record.initial_rate or 0.0) > 0 and not _begins_at_rest(plan, record):
+            backwards = "change the sign of displacement and friction, or " if (record.initial_rate or 0.0) < 0 else ""
             problems.append(Problem(where, f"{record.source}: the load point does not move forward at the start "
                                     f"({record.initial_rate:.3g} m/s); a fit starts from steady sliding or, driven by "
-                                    "commanded loading, at rest; cut it with between=(start, end)"))  # fmt: skip
+                                    f"commanded loading, at rest; {backwards}cut it (between)"))  # fmt: skip
         if plan.lag and (plan.protocol is not None or plan.drive != "commanded" or _curved(record.loading)):
             problems.append(Problem("lag", f"{record.source} is not driven by steps and ramps found in it; allowed: "
                                     "false, or drive = 'commanded' and a record of steps and ramps"))  # fmt: skip

@@ -303,7 +303,10 @@ def _consequence(fit: FitNumbers, best: Remedy) -> str:
         shifts += [(best.values[WEAKENING] - one.value, one.error) for one in fit.derived[:1]
                    if one.name.partition("@")[0] == WEAKENING]  # fmt: skip
     near = shifts and all(abs(shift) <= error < np.inf for shift, error in shifts)
-    return "the values above move by less than their errors;" if near else "do not use the values above, but"
+    if near:
+        return "the values above move by less than their errors;"
+    noise = fit.whiteness.p >= STRUCTURE and not forgets_changes(fit.plan)
+    return f"{'unless other knowledge excludes that, ' if noise else ''}do not use the values above, but"
 
 
 def _asked(fit: FitNumbers, one: Remedy) -> str:

@@ -15,7 +15,11 @@ from steadyslip.core.options import Tested, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.files.specifications.tolerance_tables import Tolerances
+from steadyslip.files.specifications.tolerance_tables import (
+    Adjustment as Adjustment,
+    Tolerances as Tolerances,
+    read_tolerances as read_tolerances,
+)
 from steadyslip.linear.stable_values import edge_along, name_along, safety_factor
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate

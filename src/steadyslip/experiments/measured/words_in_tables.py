@@ -6,8 +6,8 @@ import re
 from collections.abc import Callable, Sequence
 
 from steadyslip.core.errors import ParameterError, Problem, repr_short
-from steadyslip.experiments.measured.formats.cells import MISSING
-from steadyslip.experiments.measured.formats.text import LARGE, UTF16, cells_of, delimiter_of, header_cells, value_of
+from steadyslip.experiments.measured.formats.cells import MISSING, value_of
+from steadyslip.experiments.measured.formats.text import LARGE, cells_of, decoded, delimiter_of, header_cells
 
 FORWARD = r"forward|forwards|fwd|fw|vor|vorwärts|hin|positive|pos|cw|\+"
 BACKWARD = r"backward|backwards|bwd|back|bw|reverse|rück|rückwärts|zurück|negative|neg|ccw|[-−–]"
@@ -33,7 +33,7 @@ def without_words(raw: bytes, role_of: Callable[[str], str | None]) -> tuple[byt
     """
     if len(raw) > LARGE:  # a table of speeds has a few rows
         return raw, []
-    lines = _decoded(raw).splitlines()
+    lines = decoded(raw)[0].splitlines()
     rows = [(i, line) for i, line in enumerate(lines) if line.strip() and line.lstrip()[:1] not in ("#", "%")]
     if not rows:
         return raw, []
@@ -88,15 +88,6 @@ def _is_number(cell: str) -> bool:
     """True for a number, date or time of day."""
     found = value_of(cell)
     return found is not None and found == found
-
-
-def _decoded(raw: bytes) -> str:
-    if raw[:2] in UTF16:
-        return raw.decode("utf-16", errors="replace")
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
 
 
 def _joined(cells: Sequence[str], delimiter: str | None) -> str:

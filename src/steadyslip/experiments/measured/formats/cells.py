@@ -177,6 +177,17 @@ def day(text: str) -> float | None:
     return None
 
 
+def time_of(cell: str) -> float | None:
+    """Seconds of a time of day or of a date in a cell (see `moment` and `day`); None for other text."""
+    plain = cell.strip().strip('"')
+    return moment(plain) if (date := day(plain)) is None else date
+
+
+def value_of(cell: str) -> float | None:
+    """Time, or number with either decimal mark, in a cell; NaN for an empty cell, None for other text."""
+    return number_with_any_mark(cell) if (found := time_of(cell)) is None else found
+
+
 def _offset(zone: str | None) -> float:
     if zone is None or zone == "Z":
         return 0.0

@@ -19,9 +19,9 @@ from steadyslip.experiments.measured.formats.cells import (
     POINT,
     day,
     decimal_marks,
-    moment,
     number,
-    number_with_any_mark,
+    time_of,
+    value_of,
 )
 from steadyslip.experiments.measured.formats.labview import BEGIN, read_labview
 from steadyslip.experiments.measured.formats.remarks import Line, harmless_lines
@@ -68,14 +68,14 @@ def read_text(path: Path, skip_bad_lines: bool, mended: Callable[[bytes], bytes]
         known = [None if unit is None else known_unit(unit) for unit in units]
         return Table(names, values, np.arange(1, values.shape[1] + 1), known, ["read as XLOOK file"])
     if raw[:2] in UTF16:
-        raw = raw.decode("utf-16", errors="replace").encode()
+        raw = decoded(raw)[0].encode()
     if b"\0" in raw[:4096] or raw.startswith(tuple(OTHER_FORMATS)):
         remedy = next((said for begin, said in OTHER_FORMATS.items() if raw.startswith(begin)), "")
         endings = "endings of other formats: .h5, .hdf5, .nc, .mat, .parquet, .xlsx, .tdms"
         raise NotAvailable(f"{str(path)!r} is not text; {remedy or endings}")
     if len(raw) > LARGE and (table := _read_with_numpy(path, raw)) is not None:
         return table
-    text, notes = _decoded(raw)
+    text, notes = decoded(raw)
     longest = max(map(len, text.splitlines()), default=0) if sum(map(text.count, _BREAKS)) <= MOST_LINES else None
     if longest is None or longest > MOST_LINE:
         which = f"lines of more than {MOST_LINE} characters" if longest else f"more than {MOST_LINES} lines"
@@ -115,7 +115,10 @@ def _count_all_moments(table: Table, layout: _Layout) -> None:
         table.drop(layout.days)
 
 
-def _decoded(raw: bytes) -> tuple[str, list[str]]:
+def decoded(raw: bytes) -> tuple[str, list[str]]:
+    """Text of a file (UTF-8, UTF-16 or else Latin-1), and a note if it is Latin-1."""
+    if raw[:2] in UTF16:
+        return raw.decode("utf-16", errors="replace"), []
     try:
         return raw.decode("utf-8-sig"), []
     except UnicodeDecodeError:
@@ -153,7 +156,7 @@ def _layout(path: Path, text: str) -> _Layout:
     names, units = _names(header, comments, body[0][0], delimiter, count)
     _check_split(path, header, body, delimiter, count)
     cells = cells_of(body[0][1], delimiter)[: len(names)]
-    moments = tuple(k for k, cell in enumerate(cells) if _is_moment(cell.strip('"')))
+    moments = tuple(k for k, cell in enumerate(cells) if time_of(cell) is not None)
     days = tuple(k for k in moments if day(cells[k].strip('"')) is not None)
     return _Layout(names, units, delimiter, moments, days, header or comments, body)
 
@@ -172,13 +175,9 @@ def _check_split(path: Path, header: list[Line], body: list[Line], delimiter: st
         raise ParameterError([Problem("file", message, torn[0])], title=str(path))
 
 
-def _is_moment(cell: str) -> bool:
-    return moment(cell) is not None or day(cell) is not None
-
-
 def _read_with_numpy(path: Path, raw: bytes) -> Table | None:
     """Table of a large text with nothing but numbers below its header, parsed by NumPy; None if it is not so simple."""
-    head, notes = _decoded(raw[: raw.rfind(b"\n", 0, SAMPLE_BYTES) + 1])
+    head, notes = decoded(raw[: raw.rfind(b"\n", 0, SAMPLE_BYTES) + 1])
     if not head or head.count("\n") != len(head.splitlines()):
         return None
     try:
@@ -254,12 +253,7 @@ def cells_of(line: str, delimiter: str | None, least: int = 1) -> list[str]:
 def _value(cell: str, mark: str) -> float | None:
     """Number or time in a cell; NaN for an empty cell, None for other text."""
     found = number(cell, mark)
-    return _moment(cell) if found is None else found
-
-
-def _moment(cell: str) -> float | None:
-    plain = cell.strip().strip('"')
-    return moment(plain) if (date := day(plain)) is None else date
+    return time_of(cell) if found is None else found
 
 
 def _header(rows: list[Line], delimiter: str | None) -> tuple[list[Line], list[Line]]:
@@ -278,11 +272,6 @@ def _header(rows: list[Line], delimiter: str | None) -> tuple[list[Line], list[L
         if _holds_numbers(line, delimiter):
             return rows[:place], rows[place:]
     return rows, []
-
-
-def value_of(cell: str) -> float | None:
-    """Time, or number with either decimal mark, in a cell; NaN for an empty cell, None for other text."""
-    return number_with_any_mark(cell) if (found := _moment(cell)) is None else found
 
 
 def _holds_numbers(line: str, delimiter: str | None) -> bool:

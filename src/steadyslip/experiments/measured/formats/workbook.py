@@ -24,9 +24,9 @@ from steadyslip.experiments.measured.formats.cells import (
     DAY,
     day,
     decimal_marks,
-    moment,
     number,
-    number_with_any_mark,
+    time_of,
+    value_of,
 )
 from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, count_moments, names_and_units
 from steadyslip.files.apart import more_time
@@ -274,7 +274,7 @@ def read(path: Path, table: str | None) -> Table:
 
 def _table(path: Path, sheet: SheetCells) -> Table | None:
     """Table of the columns on a sheet; None if it has no row with two numbers."""
-    known = {text: _parsed(text) for text in set(sheet.texts)}
+    known = {text: value_of(text) for text in set(sheet.texts)}
     stated = [known[text] for text in sheet.texts]
     sheet, stated, dropped = _without_side_tables(sheet, stated)
     first = _first_row(sheet, stated)
@@ -293,14 +293,14 @@ def _table(path: Path, sheet: SheetCells) -> Table | None:
         if row >= first and k < count:
             texts[k].append((row - first, text))
     _check_formulas(path, names, values, texts)
-    marks, notes, fault = decimal_marks(names, ([text for _, text in own if _moment(text) is None] for own in texts))
+    marks, notes, fault = decimal_marks(names, ([text for _, text in own if time_of(text) is None] for own in texts))
     if fault is not None:
         raise ParameterError([Problem("file", fault)], title=str(path))
     faults = 0
     for k, own in enumerate(texts):
         for row, text in own:
-            if (value := number(text, marks[k])) is None and (value := _moment(text)) is not None:
-                kinds[k, row] = MOMENT if day(text.strip()) is None else DATE
+            if (value := number(text, marks[k])) is None and (value := time_of(text)) is not None:
+                kinds[k, row] = MOMENT if day(text.strip().strip('"')) is None else DATE
             faults += value is None and text != FORMULA
             values[k, row] = np.nan if value is None else value
     notes += [f"{faults} cells that are no numbers were left empty"] if faults else []
@@ -375,14 +375,3 @@ def _count_all_moments(found: Table, kinds: Array) -> None:
         count_moments(found, k)
     if len(days) == 1 and len(clocks) == 1:
         found.drop(days)
-
-
-def _parsed(text: str) -> float | None:
-    """Number or time in a text, with either decimal mark; NaN for an empty one, None for other text."""
-    found = number_with_any_mark(text)
-    return _moment(text) if found is None else found
-
-
-def _moment(text: str) -> float | None:
-    plain = text.strip()
-    return moment(plain) if (date := day(plain)) is None else date

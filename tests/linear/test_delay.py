@@ -484,7 +484,7 @@ def test_a_chain_of_roots_that_leads_is_no_slower_root():
     machine = late_and_light(kd, delay)
     at_once = load * (75.0 - 2 * 0.1 * np.exp(-1.0) / v_stribeck)  # at the Stribeck velocity
     assert ss.growth_rate(machine) == pytest.approx(np.log(kd / at_once) / delay, rel=1e-4)
-    with pytest.warns(ss.linear.UndecidedWarning, match="infinitely many nearly alike"):
+    with pytest.warns(ss.linear.UndecidedWarning, match="many are nearly alike"):
         found = ss.eigenvalues(machine)
     assert len(set(found.tolist())) == len(found)
 

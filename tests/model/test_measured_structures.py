@@ -359,7 +359,7 @@ def test_what_needs_equations_names_what_a_measured_response_answers():
     asked = [ss.stability, ss.linear.modes, ss.eigenvalues, ss.threshold, ss.simulate]
     asked += [lambda rig: ss.hopf(rig, **along), lambda rig: ss.cycles(rig, **along)]
     for function in asked:
-        with pytest.raises(ss.NotAvailable, match=r"`analyze` tells its verdict .* identified_modes its modes"):
+        with pytest.raises(ss.NotAvailable, match=r"`analyze` gives its verdict .* identified_modes its modes"):
             function(machine)
 
 

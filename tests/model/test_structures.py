@@ -367,7 +367,7 @@ def test_tables_of_spreadsheets_have_other_separators(tmp_path, between, decimal
 
 def test_columns_that_are_missing_or_not_known_are_told_with_those_allowed(tmp_path):
     for head, said in (("freq,damping", "no column frequency; .* allowed: frequency \\(Hz; .*, damping"),
-                       ("frequency,damping,note", "'note' is none that is allowed: .* tip.x and tip.y")):  # fmt: skip
+                       ("frequency,damping,note", "'note' is not allowed: .* tip.x and tip.y")):  # fmt: skip
         (tmp_path / "modes.csv").write_text(f"{head},tip.x\n{'1,' * head.count(',')}1,0.5\n")
         with pytest.raises(ss.RigFileError, match=said):
             ss.read_rig(written(tmp_path, "modes.csv", "", "modes"))

@@ -158,7 +158,7 @@ def compare(
     revision: Revision = "",
     approval: Approval = "",
 ) -> None:
-    """Two rigs beside each other: verdicts, margins, chances, and which of their differences matters."""
+    """Two rigs side by side: verdicts, margins, chances, and which of their differences matters."""
     from steadyslip.files.html_document import write_page
     from steadyslip.files.output import check_output
     from steadyslip.verdict.compare import compare_files

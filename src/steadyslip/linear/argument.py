@@ -97,7 +97,7 @@ class SumsOnAxis:
         yield pieces.omega ** top[pieces.row], steep, evaluate(late[pieces.row], inverse)
 
     def resolved_pieces(self) -> Iterator[tuple[_Pieces, NDArray[np.int64]]]:
-        """Yield pieces on which the change of argument is known, with the index of the dominant term, −1 if none is.
+        """Yield pieces with a known change of argument, with the index of the dominant term (−1 if no term dominates).
 
         For a rig that needs more pieces than are allowed, the unresolved ones have `UNKNOWN` instead of the index.
         """

@@ -199,8 +199,8 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
         found = tuple(mode_of(rig, point, complex(s)) for s in roots if np.isfinite(s) and s.imag >= 0)
     if not found:
         raise NotAvailable(
-            "no mode is told apart: with a delay on a body without mass there are infinitely many nearly alike, or "
-            "infinitely many that grow; analyze says which, and growth_rate how fast"
+            "modes cannot be distinguished: with a delay on a body without mass infinitely many are nearly alike, or "
+            "infinitely many grow; analyze says which, and growth_rate how fast"
         )
     chosen = next((one for one in found if number in (None, one.number)), None)
     if chosen is None:

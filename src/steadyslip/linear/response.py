@@ -167,7 +167,7 @@ def contact_coefficients(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Ex
     return b0, b1, b2, b3
 
 
-@checked(rig=slider("state_space tells how bodies and contacts of a machine answer to forces"))
+@checked(rig=slider("state_space gives the response of bodies and contacts of a machine to forces"))
 @quietly
 def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
     """f, S, r, f1, μ and B0...B3 of a rig as numbers.

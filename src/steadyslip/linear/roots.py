@@ -89,7 +89,7 @@ def _roots_of_degree(c: Array) -> ComplexArray:
 
 
 def companion_eigenvalues(c: Array) -> ComplexArray:
-    """Eigenvalues of the companion matrices (rows, n); small ones beside very large ones are rounding error."""
+    """Eigenvalues (rows, n) of the companion matrices; those far below the largest are rounding error."""
     d = c.shape[-1] - 1
     companion = np.zeros((len(c), d, d))
     companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0

@@ -176,8 +176,8 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     if count := int(np.count_nonzero(among_many(point, found))):
         which = f"of {count} of {point.size} rigs some" if point.size > 1 else "some"
         message = (
-            f"{which} eigenvalues are not known (NaN): on a body without mass that follows velocity late there are "
-            "infinitely many nearly alike, from which they are not told; growth_rate gives the rate of the rightmost"
+            f"{which} eigenvalues are not known (NaN): on a body without mass that follows velocity late, infinitely "
+            "many are nearly alike and cannot be distinguished; growth_rate gives the rate of the rightmost"
         )
         warnings.warn(message, UndecidedWarning, stacklevel=4)
     return point.wrap(found, "eigenvalues", "1/s", ("mode",))
@@ -404,7 +404,7 @@ def _nearest(low: Array, high: Array, own: Array) -> Array:
         low, high = low[..., 0], high[..., 0]
         if not np.any(high < np.inf):  # shortcut for the common case, for speed
             return np.asarray(cubic.unless(cubic.positive(low), low))
-        is_low = (low > 0) & ~((high < np.inf) & (own > np.sqrt(low) * np.sqrt(high)))  # as of `doublings`
+        is_low = (low > 0) & ~((high < np.inf) & (own > np.sqrt(low) * np.sqrt(high)))  # as in `doublings`
         return np.where(is_low, low, np.where(high < np.inf, high, np.nan))
     ends = np.concatenate([low, high], axis=-1)
     ends = np.where((ends > 0) & np.isfinite(ends), ends, np.nan)

@@ -109,7 +109,7 @@ class ResponseData(Displayed):
 
     @cached_property
     def placed(self) -> StructureData:
-        """What tells where the points are: unit matrices over the names, and the rows of `points`."""
+        """Structure with unit matrices and the rows of `points`, from which the places of the points are known."""
         one = np.eye(len(self.names))
         return StructureData(one, 0 * one, one, 0 * one, self.points(), self.source)
 

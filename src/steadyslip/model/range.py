@@ -194,7 +194,7 @@ def warn_of_range(count: int, size: int) -> None:
     """Warn the caller of a public function that `count` of `size` rigs have no result."""
     message = (
         f"{count} of {size} rigs have no answer (NaN): their numbers leave the range of floating point; "
-        "steadyslip.stability tells which"
+        "steadyslip.stability says which"
     )
     warnings.warn(message, OutOfRangeWarning, stacklevel=6)  # the line that called the public function
 

@@ -173,7 +173,7 @@ class _Reducer:
         free = self.given.get(self.model.inputs["free"]) if "free" in self.model.inputs else None
         for balance, symbol in equations if free is not None else ():
             if derivative(balance, symbol).xreplace({free: sp.Integer(1)}) == 0:
-                self._reject("the drive alone says how a body without mass moves, and is let go in this run")
+                self._reject("the motion of a body without mass is set by the drive alone, which this run releases")
 
     def _dependent_velocity(self, one: Coordinate, found: Replacements) -> sp.Expr:
         """Velocity of a coordinate whose displacement is a function of others."""

@@ -1,4 +1,4 @@
-"""Stability verdict at every moment of a slow change (frozen time), beside the simulated motion."""
+"""Stability verdict at every moment of a slow change (frozen time), compared with the simulated motion."""
 
 from __future__ import annotations
 
@@ -188,7 +188,7 @@ def frozen_verdicts(
     rtol: float = 1e-7,
     progress: Callable[[float], None] | None = None,
 ) -> FrozenVerdicts:
-    """Verdict at every moment of a slow change of load, velocity or pressure, beside the motion.
+    """Verdict at every moment of a slow change of load, velocity or pressure, compared with the motion.
 
     At each moment the protocol's load-point velocity, normal stresses and injected pressures are held constant, and
     the stability of steady sliding with these values is computed. The verdict is that of an infinitely slow change;

@@ -88,7 +88,7 @@ def _differences(result: RigComparison) -> Iterator[str]:
         such = f", as with the {' or '.join(label_of(rig, name) for name in lost)} of the other alone" if lost else ""
         yield paragraph(
             f"How much each difference contributes is not given: that needs all mixtures of {a} and {b}, and some "
-            f"cannot be built or do not slide steadily{such}. The last two columns tell what each does alone."
+            f"cannot be built or do not slide steadily{such}. The last two columns give the effect of each alone."
         )
     part = [f"its part in {result.of}"] if known else []
     head = ("difference", a, b, *part, f"{a} with that of {b}", f"{b} with that of {a}")

@@ -61,7 +61,7 @@ def check_names(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -
         except QuantityError as error:
             require(False, law, f"unit of {variable}: {error}; write an SI unit such as 'Pa', or '1' for none")
     strange = sorted(set(law.meanings()) - set(shown_units) - set(names))
-    message = f"meanings() tells of {', '.join(strange)}, which neither observables() nor memory() gives"
+    message = f"meanings() describes {', '.join(strange)}, which neither observables() nor memory() gives"
     require(not strange, law, message)
 
 

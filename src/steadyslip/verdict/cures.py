@@ -296,7 +296,7 @@ def _limits(chances: Chances, name: str, one: Adjustment) -> tuple[float, float]
 
 
 def _scan(chances: Chances, name: str, limits: tuple[float, float]) -> Array:
-    """Values of a parameter to try, rising: its own, values spread evenly between the limits, and beside its edges."""
+    """Values of a parameter to try, rising: that of the rig, evenly spread ones within the limits, and near edges."""
     low, high = limits
     own = chances.own(name)
     if low * high > 0:

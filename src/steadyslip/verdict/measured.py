@@ -26,9 +26,9 @@ _COUNTED = {0: "no root grows", 1: "a root grows without oscillating", 2: "a pai
 
 
 def growing_root(machine: Machine) -> tuple[complex | None, float]:
-    """Growing root (1/s) of a machine of which one pair grows, and by how much errors may move it.
+    """Growing root (1/s) of a machine with one growing pair of roots, and its error bound (1/s).
 
-    By the determinant or, where errors may make that root decay, by the modes. None where neither finds it.
+    It is found by the determinant or, if errors may make that root decay, by the modes; None if neither finds it.
     """
     found = measured_machine(machine)
     own = found.root()
@@ -44,7 +44,7 @@ def growing_root(machine: Machine) -> tuple[complex | None, float]:
 
 
 def doubt_of_growth(machine: Machine) -> str:
-    """Why a growing pair that was counted may decay all the same; empty where it surely grows, or none was counted."""
+    """Reason why a pair counted as growing may decay nevertheless; empty if it surely grows or no pair was counted."""
     root, error = growing_root(machine) if measured_machine(machine).count.growing == 2 else (None, 0.0)
     if root is None or error < root.real:
         return ""

@@ -176,7 +176,7 @@ class Tolerated(ReadOnly):
     def _next(self) -> str:
         parts = [f"{one.parameter} ({format_percent(round(one.share, 2))})" for one in self.alone if one.share >= LEAST]
         of = "verdict" if 0 < self.share < 1 else "growth rate"
-        return f"{', '.join(parts[:3]) or 'no single one tells much'}; shares of the variance of the {of}"
+        return f"{', '.join(parts[:3]) or 'no single one matters much'}; shares of the variance of the {of}"
 
     def to_dict(self) -> dict[str, Any]:
         """Verdicts as JSON-ready dict in SI units, as ``--json`` prints it."""

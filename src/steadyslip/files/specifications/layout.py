@@ -56,7 +56,7 @@ UNITS_LINE = "# told in: "
 MAP = "map"
 READ_ELSEWHERE = {MAP: "computes maps"} | dict.fromkeys(("record", "fit", "population"), "fits records")
 """Names of tables that are ignored when a rig is read, and the kind of command that reads each."""
-_OF_FAMILIES = ("law", "kind")  # keys that messages replace by the family's name; others, such as motion, say more
+_OF_FAMILIES = ("law", "kind")  # keys that messages replace by the family's name; other keys, such as motion, are clear
 
 
 def sections() -> tuple[Section, ...]:

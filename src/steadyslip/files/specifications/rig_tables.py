@@ -90,7 +90,7 @@ class RigTableReader(TableReader):
         return self._machine() if is_machine(self.tables) else self._slider()
 
     def _is_of_both(self) -> bool:
-        """Report tables of a rig of one body beside those of a machine, a mixture that cannot be read; True if so."""
+        """True if tables of a rig of one body are mixed with those of a machine, which is reported as a problem."""
         single = {section.name for section in sections()} - {section.name for section in machine_sections()}
         both = [name for name in self.tables if name in single]
         if not (both and is_machine(self.tables)):

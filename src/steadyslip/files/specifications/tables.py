@@ -327,7 +327,7 @@ class TableReader:
 
 
 def _from_short(family: type[FrozenRecord], raw: Any) -> Table | None:
-    """Table equivalent to a value in short form (law name, number or list); None if it is none."""
+    """Table equivalent to a value in short form (law name, number or list); None if it is no such value."""
     if isinstance(raw, Mapping):
         return dict(raw)
     if has_choice(family):

@@ -92,6 +92,6 @@ def _points(path: str, columns: dict[str, Array]) -> dict[str, tuple[Array | Non
     for name, shape in columns.items():
         point, _, axis = name.rpartition(".")
         if axis not in _AXES or unfit_name(point):
-            raise UnreadableFile(path, f"its column {name!r} is none that is allowed: {_COLUMNS}")
+            raise UnreadableFile(path, f"its column {name!r} is not allowed: {_COLUMNS}")
         found.setdefault(point, [None, None])[_AXES.index(axis)] = shape
     return {name: (x, y) for name, (x, y) in found.items()}

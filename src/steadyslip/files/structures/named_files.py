@@ -56,7 +56,7 @@ def _loaded(body: Any, folder: Path) -> Any:
 
 
 def _meant(key: str) -> str | None:
-    """Key that names a file, also of one that is misspelt: only that is told then, not what would follow from it."""
+    """Key that names a file, even if it is misspelt: then only this is reported, not faults that follow from it."""
     if key in {field.name for field in fields(StructureBody)}:
         return key if key in _READERS else None
     return next(iter(get_close_matches(key, _READERS, n=1)), None)

@@ -85,7 +85,7 @@ def read_response(path: str, folder: Path, averages: int) -> ResponseData:
         if one.repeats:
             at = slice(None), names.index(out), names.index(into)
             mean[at], deviation[at] = _mean(path, one, averages)
-    usable = ~np.any(np.isinf(mean.real), axis=(1, 2))  # what was an acceleration tells nothing of zero frequency
+    usable = ~np.any(np.isinf(mean.real), axis=(1, 2))  # no displacement follows from an acceleration at zero frequency
     return ResponseData(2 * np.pi * hertz[usable], mean[usable], deviation[usable], names, path)
 
 

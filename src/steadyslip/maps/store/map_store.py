@@ -187,7 +187,7 @@ class Store:
         return self._mark(number) != 0
 
     def damaged(self) -> list[int]:
-        """Numbers of the chunks with a mark whose files do not have its checksum."""
+        """Numbers of the chunks that are marked as done but whose files do not match the checksum in the mark."""
         return [n for n, mark in enumerate(self._marks()) if mark != 0 and not self._is_intact(n, int(mark))]
 
     def forget(self, number: int) -> None:

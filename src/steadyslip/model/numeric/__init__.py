@@ -15,7 +15,7 @@ _WRITTEN_OUT = 18
 """States, each of first order, up to which the polynomial of a machine is written out in symbols within some ten
 seconds: 8 blocks in a row with one contact have 17, and with 9 the time doubles for each block more."""
 MEASURED = (
-    "a structure given by its measured response has no equations; `analyze` tells its verdict and edges, in Python "
+    "a structure given by its measured response has no equations; `analyze` gives its verdict and edges, in Python "
     "also boundary and margins, and identified_modes its modes. Describe it by matrices or modes for more"
 )
 

@@ -50,7 +50,7 @@ class Balance:
 
     @property
     def problem(self) -> str:
-        """Why it was not found of one machine; empty where it was, or where there is none."""
+        """Reason why steady sliding of a single machine was not found; empty if it was found or does not exist."""
         if not self.held:
             return "nothing holds some body of this machine in its place; give every body a link"
         return (
@@ -81,7 +81,7 @@ def spring_of(site: Site, displacement: Array, integral: Array, speeds: Array) -
 
 
 def balances(machine: MachineMatrices) -> Balance:
-    """Steady sliding of one machine or of several; `held` and `settled` tell where it was not found."""
+    """Steady sliding of one machine or of several; `held` and `settled` are false where it was not found."""
     return _Newton(machine).solve()
 
 

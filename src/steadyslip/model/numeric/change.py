@@ -2,7 +2,7 @@
 
 With P(s) = s E − A and a parameter that changes it by U B(s) Vᵀ of low rank, Δ(s) = det(1 + Vᵀ P(s)⁻¹ U B(s)) is the
 ratio of the characteristic functions. The resolvent is computed once over frequencies, for all values of the parameter;
-turns of Δ around 0 tell how many more roots grow (theory 13).
+the number of further growing roots follows from the turns of Δ around 0 (theory 13).
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def frequencies(own: StatePencil, further: tuple[float, ...] = ()) -> Array:
 
 
 class Turns:
-    """How many more eigenvalues grow under changes of one parameter."""
+    """Change in the number of growing eigenvalues under changes of one parameter."""
 
     def __init__(self, change: LowRankChange) -> None:
         self.change = change

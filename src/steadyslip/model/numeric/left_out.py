@@ -49,7 +49,7 @@ class LeftOut:
 
 
 def left_out(mechanism: Mechanism, names: Set[str]) -> LeftOut | None:
-    """What can be left out of a mechanism without touched coordinates; None if that is little, or follows nothing.
+    """Part that can be left out of a mechanism without touched coordinates; None if that is little or nothing.
 
     Holds for all mechanisms with its structures (`alike`) that touch none but coordinates with these `names`.
     """

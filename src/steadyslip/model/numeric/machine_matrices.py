@@ -152,7 +152,7 @@ class VariedMachine:
         return _Assembler(self.mechanism, values, None if whole else self.left).matrices()
 
     def _left_of(self, mechanisms: Sequence[Mechanism]) -> LeftOut | None:
-        """What can be left out of all of the machines; None if their structures differ."""
+        """Part that can be left out of all of the machines; None if their structures differ."""
         if not all(alike(one.structures, self.own.structures) for one in mechanisms):
             return None
         names = frozenset().union(*map(touched, (self.own, *mechanisms)))

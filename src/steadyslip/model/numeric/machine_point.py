@@ -63,7 +63,7 @@ class MachinesAlong:
         return StatePencil(e, a, self.size, bool(self.posed[i]))
 
     def growing(self, sure: bool) -> NDArray[np.int64]:
-        """How many eigenvalues grow, (p,); `ILL_POSED`, or if `sure` `UNDECIDED` where rounding hides it."""
+        """Number (p,) of growing eigenvalues; `ILL_POSED`, or if `sure` `UNDECIDED` where rounding hides a sign."""
         if self.own is None:
             return growing_roots(self.e, self.a, self.size, self.posed, sure)
         return np.array([self._pencil(i).growing(sure) for i in range(len(self.posed))])
@@ -118,7 +118,7 @@ class MachinePoint(HasCache):
 
     @property
     def growing(self) -> int:
-        """How many eigenvalues have a positive real part."""
+        """Number of eigenvalues with a positive real part."""
         return int(np.sum(self.pencil.eigenvalues.real > 0))
 
 

@@ -1,9 +1,9 @@
 """Growing roots of a machine whose structure is a measured response: turns of det(I + R G) round 0 (theory 13).
 
 R(iω) is the receptance at the contacts, in their slips and distances, and G(s) the stiffness with which the contacts
-answer. Beyond the band the structure is passive: with the part of G that only stores and takes energy the determinant
-cannot turn further than its angles at the end of the band tell. What is left of G, the push of friction by a changing
-normal force, must be small in the highest octave.
+answer. Beyond the band the structure is passive: with the part of G that only stores and takes energy, the angles at
+the end of the band limit how far the determinant can turn. The rest of G, the push of friction by a changing normal
+force, must be small in the highest octave.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def _steady_stresses(site: Site) -> tuple[float, float]:
     found = site.laws.steady(site.own, site.velocity, 1.0, 0.0, 0.0, 0.0, site.stiffness)
     if found.by_spring or found.by_friction or found.by_distance:
         raise NotAvailable(
-            f"contacts.{site.name}: a measured response does not tell the normal force of steady sliding; "
+            f"contacts.{site.name}: the normal force of steady sliding does not follow from a measured response; "
             "give steady_normal_stress in the law 'compliant', or use a law with constant normal force"
         )
     sigma = float(found.pressed)
@@ -260,9 +260,9 @@ class MeasuredMachine:
 
     @cached_property
     def _doubt_below(self) -> str:
-        """Why the structure may have modes below the band; empty if it begins as that of a spring.
+        """Reason why the structure may have modes below the band; empty if its response begins like that of a spring.
 
-        Of a mode below, a part in −1/ω² would be seen beside a power series in ω², that of all modes above.
+        A mode below the band adds a term in −1/ω² to the power series in ω² of all modes above.
         """
         first, own = self.response.omega[0], self.samples
         if not first:

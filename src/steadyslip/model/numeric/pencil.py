@@ -95,8 +95,9 @@ class StatePencil:
     def _modal_basis(self) -> tuple[Array, Array]:
         """Matrices from modal states to z, and from rows of the pencil to modal rows.
 
-        In modes of the symmetric parts of stiffness and inertia, with velocities beside displacements times frequency,
-        a structure's lowest mode keeps its digits beside the highest. Without such modes the pencil is only made even.
+        In modes of the symmetric parts of stiffness and inertia, with velocities comparable to displacements times
+        frequency, the lowest mode of a structure is as accurate as the highest. Without such modes the pencil is only
+        balanced.
         """
         size, at, moving = self.size, slice(self.size), slice(self.size, 2 * self.size)
         mass, stiffness = (0.5 * (m + m.T) for m in (self.e[moving, moving], -self.a[moving, at]))
@@ -148,7 +149,7 @@ class StatePencil:
         return values, right, rows
 
     def growing(self, sure: bool) -> int:
-        """How many eigenvalues have a positive real part; if `sure`, `UNDECIDED` where rounding hides a sign."""
+        """Number of eigenvalues with a positive real part; if `sure`, `UNDECIDED` where rounding hides a sign."""
         if not self.posed:
             return ILL_POSED
         roots = self.eigenvalues
@@ -232,7 +233,7 @@ class StatePencil:
         return solved
 
     def _solved(self, s: ComplexArray, right: Array) -> ComplexArray:
-        """(s E − A)⁻¹ `right` at places s (p,), (p, N, m) for `right` (N, m); beside a place that is an eigenvalue."""
+        """Products (p, N, m) of (s E − A)⁻¹ and `right` (N, m) at s (p,); slightly off an s that is an eigenvalue."""
         matrices = s[:, None, None] * self.e - self.a
         try:
             return np.asarray(np.linalg.solve(matrices, np.broadcast_to(right, (len(s), *right.shape))))

@@ -155,9 +155,9 @@ def _usual_step(plant: Plant, unit: str) -> float:
     held = sum(friction_at_rest(one, steady) * abs(float(one.row @ moved)) for one in plant.contacts)
     step = 2 * held / float(pull @ moved)
     if not (np.isfinite(step) and step > 0):
-        missing = "no gain kp or spring tells" if held else "friction at rest without a load is 0 and does not tell"
+        missing = "there is no gain kp or spring" if held else "friction at rest without a load is 0"
         message = (
-            f"missing; {missing} how far a step of the target is: give one, such as "
+            f"missing; {missing} from which the size of a step of the target follows: give one, such as "
             f"\"displacement-step at=0s by='1 {unit}'\""
         )
         raise ParameterError([Problem("protocol", message)])

@@ -215,7 +215,7 @@ class _Search:
             self._tried(wide, point)
 
     def _next(self, precision: float) -> tuple[Array, Array]:
-        """Next sizes and indices of the rigs whose brackets are too wide: the middle, or beside undecided sizes."""
+        """Next sizes and indices of the rigs with too wide brackets: the middle, or values near undecided sizes."""
         low, high, (left, right) = self.low, self.high, self.doubt.T
         with np.errstate(invalid="ignore"):
             clear = np.isnan(left)

@@ -116,7 +116,7 @@ class Rays:
 
 @lru_cache(maxsize=8)
 def _monomials(n: int, order: int) -> tuple[tuple[Array, ...], Array]:
-    """Indices of the factors of all monomials of an order in n variables, and how often each stands in a form."""
+    """Indices of the factors of all monomials of an order in n variables, and multiplicity of each in a form."""
     places = np.array(list(combinations_with_replacement(range(n), order)))
     times = [factorial(order) / prod(map(factorial, np.unique(one, return_counts=True)[1])) for one in places]
     return tuple(places.T), np.array(times)

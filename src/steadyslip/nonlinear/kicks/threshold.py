@@ -113,7 +113,7 @@ class Threshold(Displayed):
         return self._found() + self._way_out()
 
     def _way_out(self) -> str:
-        """What decides more kicks, where time or steps were used up; else empty."""
+        """Clause on how to decide more kicks if time or steps were used up; else empty."""
         if self.decided or self.interrupted or self.doubt not in USED_UP:
             return ""
         modes = ", fewer modes (kept_modes)" if self.rig.mechanism().structures else ""

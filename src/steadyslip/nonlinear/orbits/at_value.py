@@ -151,7 +151,7 @@ def slip_sentence(rig: Slider | Machine, cycle: Cycle, steady: int = 0) -> str:
 
 
 def own_motion(rig: Slider | Machine, along: str) -> str:
-    """Sentence on the rig's motion from beside steady sliding: the stable cycle that it approaches, with slip events.
+    """Sentence on the rig's motion from near steady sliding: the stable cycle that it approaches, with slip events.
 
     Empty if the motion cannot be computed. `along` is the name of a parameter that the rig has.
     """
@@ -171,7 +171,7 @@ def own_motion(rig: Slider | Machine, along: str) -> str:
 def simulations(
     onset: Onset, steady: int, rtol: float | None, value: float, beside: Sequence[Cycle]
 ) -> list[Simulation]:  # fmt: skip
-    """Simulated motions from beside unstable cycles and steady sliding, up to the first that reaches a stable cycle."""
+    """Simulated motions from near unstable cycles and steady sliding, up to the first that reaches a stable cycle."""
     tracer, found = tracer_of(onset, steady, rtol), list[Simulation]()
     for cycle in (*beside, None):
         start = "beside a cycle" if cycle else "beside steady sliding"

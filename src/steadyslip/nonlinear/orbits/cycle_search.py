@@ -58,7 +58,7 @@ def _crossed(piece: BranchPiece, tracer: Tracer) -> bool:
 
 
 def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle]) -> BranchPoint | None:
-    """First cycle reached by motions from known cycles `near` and from beside steady sliding; None if there is none."""
+    """First cycle reached by motions from known cycles `near` and from near steady sliding; None if there is none."""
     try:
         starts = [orbit_of(cycle).states[0] for cycle in near] + [tracer.flow.ahead(value, AHEAD)]
     except Failure:

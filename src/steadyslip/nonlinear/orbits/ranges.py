@@ -62,7 +62,7 @@ def stretches_of(
 
 @dataclass(frozen=True)
 class Neighbour:
-    """Nearest bifurcation or end of a branch (or of its doublings) beside a value of the parameter.
+    """Bifurcation or end of a branch (or of its doublings) that is nearest to a value of the parameter.
 
     Attributes
     ----------

@@ -110,7 +110,7 @@ def _passing(cycle: Cycle) -> str:
 def _located(
     kind: str, before: BranchPoint, now: BranchPoint, measure: Callable[[Point], float], build: PointBuilder, index: int
 ) -> SpecialCycle | None:
-    """Bifurcation at the zero of a test function between two points; None if it is not found or is none."""
+    """Bifurcation at the zero of a test function between two points; None if none is found."""
     shooting = now.shooting
     try:
         ends = measure(before.point), measure(now.point)

@@ -9,16 +9,19 @@ import xarray as xr
 
 import steadyslip as ss
 from steadyslip.core.caching import HasCache, cached
-from steadyslip.model import build_model
+from steadyslip.core.expressions import derivative
+from steadyslip.model import build_model, reduction as reduction_module
 from steadyslip.model.linearisation import characteristic_coefficients, linearise
 from steadyslip.model.point import operating_point
 from steadyslip.model.posed import well_posed
 from steadyslip.model.reducing import reduce_model
 from steadyslip.model.scales import natural_scales, scale_rows
+from steadyslip.model.variational import with_sensitivities
 from steadyslip.model.weights import weights
 from steadyslip.motion.engine import Call
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.kicks.settled import rest_of
+from structure_work_at_random import drawn
 
 ROCK = ss.laws.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6)
 RIG = ss.Slider(
@@ -200,3 +203,21 @@ def test_tables_of_other_lengths_do_not_reach_the_kernel():
     tables = jobs.tables(machine, 0, 4, False, False)
     with pytest.raises(ValueError, match="rows for 4 jobs"):
         Call(machine, (*tables[:2], tables[2][:3], tables[3]), 4, np.empty(0))
+
+
+def test_sensitivities_are_differentiated_only_where_something_moves_them(monkeypatch):
+    """Of n + n² + n variables nearly all pairs have derivative zero; each cost a visit of the whole expression."""
+    reduction = reduce_model(build_model(drawn(3)[0]))
+    extended, n, asked = with_sensitivities(reduction), len(reduction.state), []
+    monkeypatch.setattr(reduction_module, "derivative", lambda e, x: asked.append(e) or derivative(e, x))
+    matrix = extended.jacobian()
+    assert len(matrix) == n * (n + 2)
+    assert len(asked) < 0.5 * len(matrix) ** 2
+    rates, state = extended.rates, extended.state
+    chance = np.random.default_rng(1)
+    for i, k in chance.integers(0, len(matrix), (200, 2)):
+        moved = rates[i].has(state[k]) or any(one.has(state[k]) for one in extended.residuals)
+        assert moved or matrix[i][k] == 0
+    for j in range(n):  # each column moves by the matrix itself
+        rows, columns = slice(n * (j + 1), n * (j + 2)), slice(n * (j + 1), n * (j + 2))
+        assert [row[columns] for row in matrix[rows]] == reduction.jacobian()

@@ -377,6 +377,12 @@ def _replaced(e: Any, seen: dict[sp.Basic, sp.Basic]) -> Any:
     return found
 
 
+@lru_cache(maxsize=2**12)
+def symbols_of(e: sp.Expr) -> frozenset[sp.Symbol]:
+    """Symbols of an expression (cached; `free_symbols` visits all its parts each time)."""
+    return frozenset(sp.sympify(e).free_symbols)
+
+
 @lru_cache(maxsize=2**15)
 def derivative(e: sp.Expr, x: sp.Symbol) -> sp.Expr:
     """Derivative of an expression with respect to a symbol, equal to `sympy.diff` but faster and cached.

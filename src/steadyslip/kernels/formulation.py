@@ -131,7 +131,8 @@ class Formulation:
 
     def _entry(self, matrix: list[list[sp.Expr]], i: int, k: int) -> sp.Expr:
         """Entry (i, k) of the Jacobian, with the terms due to changing constants."""
-        entry = self._with_constants(matrix[i][k])
+        entry = matrix[i][k]
+        entry = entry if entry is sp.S.Zero else self._with_constants(entry)
         if i not in self.driven:
             return entry
         return entry + self._solved.along(self.driven[i], self.reduction.state[k])

@@ -13,7 +13,7 @@ import sympy as sp
 
 from steadyslip.core.caching import HasCache
 from steadyslip.core.errors import InternalError
-from steadyslip.core.expressions import derivative
+from steadyslip.core.expressions import derivative, symbols_of
 from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.equations import TIME, V_LP, Model, P, Q
 from steadyslip.model.kinematics import VelocityVariable, W, single_variable
@@ -219,8 +219,20 @@ class Unknowns:
 
     def along(self, expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
         """Total derivative with respect to a variable, with unknowns that change so that the residuals stay zero."""
+        if not self._moves(expression, variable):  # nearly all pairs of many variables
+            return sp.S.Zero
         own = [derivative(residual, variable) for residual in self.residuals]
         return derivative(expression, variable) + self.followed(expression, own)
+
+    def _moves(self, expression: sp.Expr, variable: sp.Symbol) -> bool:
+        """True if a variable is in an expression, or in the residuals of unknowns that are."""
+        own = symbols_of(expression)
+        return variable in own or (variable in self._causes and not own.isdisjoint(self.symbols))
+
+    @cached_property
+    def _causes(self) -> frozenset[sp.Symbol]:
+        """Symbols of the residuals."""
+        return frozenset().union(*map(symbols_of, self.residuals))
 
     def changes(self, perturbation: Sequence[sp.Expr]) -> list[sp.Expr]:
         """First-order changes −M⁻¹ `perturbation` of the unknowns, M the `matrix`, by elimination without expansion."""

@@ -23,7 +23,7 @@ from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.flow import FlowRunner
 
 BESIDE = 1e-4  # step of finite differences, natural sizes
-MOST_COMPILED = 12  # variables, times contacts, of structures: 12 take 3 CPU s, 15 take 8, 10 with two contacts 10
+MOST_COMPILED = 18  # variables, times contacts, of structures: 15 take 3 CPU s, 12 with two contacts 5
 ROUNDS = 8  # limit of Newton iterations
 CLOSED = 1e-6  # distance after a period below which an orbit is closed, natural sizes
 LOOSE = 1e3  # as CLOSED, in integration tolerances, if that is more

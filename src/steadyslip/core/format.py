@@ -115,7 +115,7 @@ _SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # takes a prefix; not m^2 (it 
 _SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 HIDDEN = 1e-3  # a value below this share of its error is printed as 0: none of its digits is known
 MOST_DIGITS = 12  # of the ends of a narrow range; further digits are rounding errors
-SAME_LOAD = 1e-9  # relative difference of loads that are the same but for rounding of their units
+SAME_LOAD = 1e-9  # relative difference of loads that are equal apart from rounding of their units
 _SHORTEST, _LONGEST = 1e-3, 1e5  # numbers in this range need no exponent; others are in the SI unit without prefix
 _LONG = 1e4  # from this number on, a suitable prefix is chosen in place of the prefix in the file
 

@@ -36,7 +36,7 @@ def hunting(result: Hunt, ax: Any = None) -> Any:
     until = min(end, _LATER * result.approached_at or end)  # later the axis only rests on the target
     across, seconds = display_unit("s", until)
     series = (
-        (f"target less place{result.at_body}", result.error, result.unit),
+        (f"target minus position{result.at_body}", result.error, result.unit),
         (result.force_label, result.force, result.force_unit),
     )
     for axes, (name, values, si) in zip(panels, series, strict=True):

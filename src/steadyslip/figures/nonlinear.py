@@ -53,7 +53,7 @@ _STEADY: dict[str, dict[str, Any]] = {
 """Line styles of steady sliding: stable, unstable, and dotted where that is not known."""
 _UNDECIDED_HATCHES = ("++", "oo", "..")
 NARROW_RANGE = 1e-3  # relative range of a branch below which the axis shows the distance from the onset (by trial)
-BEYOND = 1.5  # steady sliding is drawn beyond the onset by this factor, or by so many tenths of the branch (by trial)
+BEYOND = 1.5  # drawn range of steady sliding beyond the onset: this factor, or in tenths of the branch (by trial)
 LEGEND_WIDTH = 36  # characters per line of a legend with two columns
 
 
@@ -86,7 +86,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     if 0 < reach < NARROW_RANGE * abs(branch.onset.value):  # tick labels of values would all look alike
         origin = branch.onset.value
         factor, unit = display_unit(branch.unit, reach, area)
-        along = f"{along} less {format_quantity(origin, branch.unit, 6, area)}"
+        along = f"{along} minus {format_quantity(origin, branch.unit, 6, area)}"
     drive = branch.cycles[0].speed if len(branch) and branch.cycles[0].contact else branch.rig.drive.velocity
     speed, speed_unit = display_unit("m/s", drive)
     onset_speed, driven = drive, branch.along == "drive.velocity"

@@ -31,7 +31,7 @@ def not_linear_error(name: str) -> NotAvailable:
 
 
 def too_many_windows_error(name: str) -> NotAvailable:
-    """Error for a rig with a delay of so many periods that its stable windows cannot be listed."""
+    """Error for a rig whose delay spans too many periods to list its stable windows."""
     return NotAvailable(
         f"the delay is so long for this rig that the windows of {name} are too many to be listed; boundary(rig, "
         f"{name!r}) finds those next to its own value"

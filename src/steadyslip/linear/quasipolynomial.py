@@ -202,7 +202,7 @@ def crossing_delays(p: Array, q: Array) -> tuple[Array, Array, Array]:
     """Delays (s), rising, at which roots of p + q exp(−sh) cross the axis; frequencies (rad/s); directions (±1).
 
     For one rig. Crossings to the right (+1) have the higher frequencies and so come more often: beyond some delay the
-    rig is unstable for good, and the list ends. Where two frequencies nearly agree that delay is very long; then the
+    rig stays unstable, and the list ends. Where two frequencies nearly agree that delay is very long; then the
     list ends after `_MOST_PERIODS` periods of the fastest crossing.
     """
     (scaled,), _, (rate,) = nondimensional(np.stack([p, q])[None], np.zeros((1, 2)))

@@ -130,7 +130,7 @@ def state_space(
     inputs : sequence of str, optional
         Names of ``Model.inputs``. Unless given all: of a slider perturbation of the load-point velocity (m/s),
         disturbance stress on the block q (Pa), disturbance of the normal stress (Pa; the B4 of eq. 12); of a machine
-        ``load_velocity`` (m/s or rad/s), ``BODY.push`` (N or N m) and ``CONTACT.press`` (N), but for those that move a
+        ``load_velocity`` (m/s or rad/s), ``BODY.push`` (N or N m) and ``CONTACT.press`` (N), except those that move a
         body without mass at once. ``CONTACT.pores`` (N, of a slider ``.pores``, Pa) is the pressure around pore fluid.
 
     Returns

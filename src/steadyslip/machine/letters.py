@@ -115,7 +115,7 @@ _ESTIMATES = {
     r"offset": ("offset of friction", "offset"),
     r"start\.hold": ("rest before the record", "rest before"),
     r"initial\.(.+)": ("{} at the beginning", "{} at first"),
-    r"a - b": ("direct less evolution effect a - b", "a − b"),
+    r"a - b": ("direct minus evolution effect a - b", "a − b"),
     r"k_c": ("critical stiffness k_c", "k_c"),
     r"k/k_c": ("stiffness over critical k/k_c", "k/k_c"),
     r"k/k_cal": ("stiffness over that of the calibration k/k_cal", "k/k_cal"),

@@ -127,8 +127,8 @@ def characteristic_terms(model: Model) -> tuple[Term, ...]:
     found = _determinant(model)
     if found is None:
         raise NotAvailable(
-            f"this is not offered for a machine of {len(model.coordinates)} coordinates that hold each other in so "
-            "many ways: its characteristic polynomial would fill pages"
+            f"this is not available for a machine of {len(model.coordinates)} coordinates with so many links: its "
+            "characteristic polynomial would fill pages"
         )
     highest = max((powers[0] for powers in found), default=0)
     nothing = (0,) * len(model.delays)

@@ -312,7 +312,7 @@ def _carried_equation(
     ]  # fmt: skip
     flat = [e for group in groups for e in group.values()]
     if any(e.free_symbols & none.keys() for e in flat):
-        raise NotAvailable("friction and contacts of a machine held in many ways must be linear in the stresses")
+        raise NotAvailable("friction and contacts of a machine with many supports must be linear in the stresses")
     parts = ArrayFunction([*model.parameters.values(), *bends.signs], flat)
     places = tuple(tuple(group) for group in groups)
     return CarriedEquation(len(laws), parts, (), (), bends, places, len(symbols))

@@ -151,7 +151,7 @@ def joined(rig: Slider | Machine, sentences: Mapping[str, str]) -> str:
 class Swings(NamedTuple):
     """Oscillation of a contact at the end of a run: mean period (s), lowest and highest velocity (m/s), trend.
 
-    The trend is the relative growth of the swings (peak less trough); 0 if they alternately grow and shrink.
+    The trend is the relative growth of the swings (peak minus trough); 0 if they alternately grow and shrink.
     """
 
     period: float
@@ -235,7 +235,7 @@ def _seen(swings: Swings) -> bool:
 
 
 def _sizes(peaks: Sequence[AnyEvent], troughs: Sequence[AnyEvent]) -> list[float]:
-    """Velocities of peaks less those of the troughs (m/s), in order."""
+    """Velocities of peaks minus those of the troughs (m/s), in order of time."""
     return [peak.velocity - trough.velocity for peak, trough in zip(peaks, troughs, strict=False)]
 
 

@@ -166,7 +166,7 @@ def _positive(given: Any) -> bool:
 
 
 def spelled(output: str) -> str:
-    """Name of an observable with hyphens for underscores, but for the name of a body or contact before the dot."""
+    """Name of an observable with hyphens for underscores, except in the name of a body or contact before the dot."""
     owner, dot, own = output.rpartition(".")
     return owner + dot + own.replace("_", "-")
 

@@ -60,7 +60,7 @@ class FrequencyResponse(ReadOnly):
     gains, phases : ndarray (m, n)
         Gain and phase at `amplitudes`, of the output's Fourier component with the input's period.
     shift : ndarray (m, n)
-        Mean of the output less its steady value.
+        Mean of the output minus its steady value.
     mean_friction : ndarray (m, n)
         Mean friction over mean normal stress (or force) at the slider or the output's contact; NaN for other outputs.
     steady_friction : float

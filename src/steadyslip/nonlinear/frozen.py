@@ -51,8 +51,8 @@ class FrozenVerdicts(ReadOnly):
     t : ndarray (n,)
         Moments, s.
     values : dict of str to ndarray (n,)
-        Parameters of the rig that the protocol changes, SI units: velocity of the drive, preloads; a preload less the
-        injected pressure is the effective normal stress.
+        Parameters of the rig that the protocol changes, SI units: velocity of the drive, preloads; a preload minus
+        the injected pressure is the effective normal stress.
     labels : dict of str to str
         Display names of the parameters in `values`: their names, or ``effective normal stress``.
     growth_rate : ndarray (n,)

@@ -180,7 +180,7 @@ class SlideHoldSlide(Piece, name="slide-hold-slide"):
 
 
 class Creep(Piece, name="creep"):
-    """The drive is let go for some time and pulls with a stress of its own, whatever the block does.
+    """The drive is released for some time and pulls with a given stress, whatever the motion of the block.
 
     The stress is that at release, or `to`, plus the steps, ramps and tables of creep that begin during the release.
     Afterwards the drive goes on with its former velocity, from the position at which it carries this stress.

@@ -177,7 +177,7 @@ def _within(tolerated: Tolerated) -> str:
         values = (
             f"{label_of(rig, name)} {format_parameter(rig, name, value)}" for name, value in tolerated.otherwise.items()
         )
-        return f"{text}, but for one at their very end: {', '.join(values)}."
+        return f"{text}, except one at the very end of the ranges: {', '.join(values)}."
     return f"{text}."
 
 

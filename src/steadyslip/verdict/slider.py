@@ -33,6 +33,7 @@ UNLIMITED = (
 MEANS = STABLE_MEANS.format(what="an oscillation or a run-away")
 """Limits of the verdict "stable" on a slider, as text."""
 HOW_LARGE = "The size of such a kick does not follow from the kind of onset; steadyslip threshold computes it."
+"""Second line of text on those limits, if the verdict has a kind of onset but no thresholds of kicks."""
 AT_EDGE = {"at the edge": "oscillation with period {period}", "along the axis": "critical stiffness {critical}"}
 """Text of rows on the critical stiffness, by label; browser pages use the same."""
 MOST_WINDOWS = 4  # stable intervals of stiffness listed in the text; chosen by trial, length against completeness
@@ -144,9 +145,7 @@ def meaning(analysis: Findings) -> list[str]:
     if analysis.stable:
         lines = [MEANS]
         if not analysis.kicks:
-            lines.append(
-                "The size of such a kick does not follow from the kind of onset; steadyslip threshold computes it."
-            )
+            lines.append(HOW_LARGE)
         return lines if analysis.onset is not None or analysis.kicks else lines[:1]
     if analysis.growth_rate != math.inf and analysis.rig.friction.runs_away() and not _limited(analysis.rig):
         if analysis.judders:

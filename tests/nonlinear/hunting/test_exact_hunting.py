@@ -244,10 +244,10 @@ def test_the_motion_is_written_as_columns_document_and_figure(tmp_path):
     assert told.stdout.splitlines()[-3:] == [f"wrote {name}" for name in names]
     found = ss.hunt(ss.read_rig(held), until=9.0)
     first, *_ = names[0].read_text().splitlines()
-    assert first == "time (s),target less place (m),speed (m/s),force of the drive (N)"
+    assert first == "time (s),target minus position (m),speed (m/s),force of the drive (N)"
     columns = np.loadtxt(names[0], delimiter=",", skiprows=1).T
     for written, own in zip(columns, (found.time, found.error, found.velocity, found.force), strict=True):
         np.testing.assert_allclose(written, own, rtol=1e-11, atol=1e-11)
     assert "does it hunt" in names[1].read_text()
     upper, lower = found.plot()
-    assert [upper.get_ylabel(), lower.get_ylabel()] == ["target less place (m)", "force of the drive (N)"]
+    assert [upper.get_ylabel(), lower.get_ylabel()] == ["target minus position (m)", "force of the drive (N)"]

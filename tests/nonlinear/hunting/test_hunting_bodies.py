@@ -126,7 +126,7 @@ def test_what_hangs_on_a_soft_gear_rests_off_the_target():
 
 def test_figures_and_tables_name_the_body_and_the_torque(tmp_path):
     labels = [axes.get_ylabel() for axes in found().plot()]
-    assert labels == ["target less place at motor (deg)", "torque of the drive (mN m)"]
+    assert labels == ["target minus position at motor (deg)", "torque of the drive (mN m)"]
     found().to_csv(tmp_path / "run.csv")
     head = (tmp_path / "run.csv").read_text().partition("\n")[0]
-    assert head == "time (s),target less place at motor (rad),speed (rad/s),torque of the drive (N m)"
+    assert head == "time (s),target minus position at motor (rad),speed (rad/s),torque of the drive (N m)"

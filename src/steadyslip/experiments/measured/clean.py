@@ -261,7 +261,7 @@ def _effective(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     if "normal" not in si:
         notes.append("pore pressure left out: there is no normal stress to take it from")
         return {role: values for role, values in si.items() if role != "pore_pressure"}
-    notes.append("normal stress taken as total; the effective one, less the pore pressure, presses")
+    notes.append("normal stress taken as total; the effective stress is the total minus the pore pressure")
     return si | {"normal": si["normal"] - si["pore_pressure"]}
 
 

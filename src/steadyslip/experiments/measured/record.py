@@ -43,7 +43,7 @@ class Record(Displayed, HasCache):
     friction : ndarray (n,)
         Shear stress over normal stress.
     normal : ndarray (n,) or None
-        Effective normal stress, Pa: total less `pore_pressure` where that was measured.
+        Effective normal stress, Pa: total minus `pore_pressure` if that was measured.
     shear : ndarray (n,) or None
         Pa.
     displacement : ndarray (n,) or None

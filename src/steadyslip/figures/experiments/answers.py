@@ -70,7 +70,7 @@ def profile(result: Profile, ax: Axes | None = None) -> Axes:
 
 
 def comparison(result: LawComparison, ax: Axes | None = None) -> Axes:
-    """Plot AIC and BIC of each law, less the smallest of all laws.
+    """Plot AIC and BIC of each law, minus the smallest of all laws.
 
     Parameters
     ----------

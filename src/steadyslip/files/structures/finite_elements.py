@@ -30,7 +30,7 @@ class NamedMatrices(dict[str, Array]):
         self.freedoms = freedoms
 
     def without_held(self, path: str) -> NamedMatrices:
-        """Those left when held degrees of freedom are taken out and massless ones follow the others without delay.
+        """Matrices without held degrees of freedom, and without massless ones, which follow the others without delay.
 
         Raises
         ------

@@ -22,7 +22,7 @@ _REGULAR = 1e-10  # reciprocal condition of K_ii, made even, above which the rou
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """Which coordinates of the structures are kept, and what the others add to their steady sliding.
+    """Coordinates of the structures that are kept, and the effect of the others on steady sliding.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
 """Matrices of a machine: M q'' + C q' + K q = forces of contacts, with directions of slip and of distance.
 
 Displacements are absolute here, measured from the unstressed state of springs, with the load point at rest at zero:
-the equations are linear but for the contacts. Machines that differ in one parameter are assembled together, as arrays
-with a leading axis: shapes (...) are () for one machine, (p,) for p values of a parameter.
+the equations are linear except for the contacts. Machines that differ in one parameter are assembled together, as
+arrays with a leading axis: shapes (...) are () for one machine, (p,) for p values of a parameter.
 """
 
 from __future__ import annotations

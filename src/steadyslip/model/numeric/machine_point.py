@@ -52,7 +52,7 @@ class MachinesAlong:
     at: NDArray[np.int64]
 
     def pencil(self, i: int) -> StatePencil | None:
-        """Pencil of one of them; None without steady sliding."""
+        """Pencil of one of the machines; None if it has no steady sliding."""
         return self._pencil(i) if self.balance.exists[i] else None
 
     def _pencil(self, i: int) -> StatePencil:

@@ -239,7 +239,7 @@ class MeasuredMachine:
         return ratio, noise, np.sum(slope * at.between, axis=(0, 1))
 
     def _doubt(self, omega: Array, ratio: ComplexArray, noise: Array, between: Array) -> str:
-        """Why turns inside the band are not known; empty if they are."""
+        """Reason why turns inside the band are not known; empty if they are known."""
         far = ~(noise + between < np.abs(ratio))
         far[1:] |= ~_follows(ratio)
         if not np.any(far):
@@ -279,7 +279,7 @@ class MeasuredMachine:
         return ""
 
     def _doubt_beyond(self) -> str:
-        """Why turns beyond the band are not known; empty if they are."""
+        """Reason why turns beyond the band are not known; empty if they are known."""
         own, last = self.samples, self.samples.omega[-1]
         top = own.omega >= last / 2
         s, r = 1j * own.omega[top], self._seen[..., top]

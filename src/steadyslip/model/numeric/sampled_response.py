@@ -23,7 +23,7 @@ class ReceptanceSamples:
     between: Array
 
     def at(self, places: Array | ComplexArray) -> ReceptanceSamples:
-        """The same at other frequencies, by polynomials through the nearest samples."""
+        """Samples at other frequencies, by polynomials through the nearest samples."""
         start = np.searchsorted(self.omega, places.real) - _NEAR // 2
         start = np.clip(start, 0, len(self.omega) - _NEAR)
         around = start[:, None] + np.arange(_NEAR)

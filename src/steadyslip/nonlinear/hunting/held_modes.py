@@ -123,7 +123,7 @@ class HeldPiece:
 
     @cached_property
     def pressing(self) -> tuple[list[tuple[Load, Array]], ...]:
-        """For each contact the list of its loads, each with the row of the normal stress that it adds."""
+        """Loads of each contact as a list, each with the row of the normal stress that it adds."""
         sides = iter(zip(self.mode.loads, self.pulls, strict=True))
         found = []
         for contact in self.plant.contacts:

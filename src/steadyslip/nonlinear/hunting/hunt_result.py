@@ -41,14 +41,14 @@ class Hunt(ReadOnly):
     runs_away : bool
         True if the error grows without limit: the controller is unstable in sliding, or too weak for a load.
     lowest, highest : float
-        Extremes of measured position less target (m or rad), in the last cycle, or since the last rest; for a machine
+        Extremes of measured position minus target (m or rad), in the last cycle, or since the last rest; for a machine
         those of the drive, or of the body whose feed is given (`velocity_of`), converted as in steady motion.
     period : float
         Duration of the cycle (s), of strokes both ways; NaN if strokes do not repeat.
     repeats : bool
         True if the last two cycles agree to 1e-9 (with numerical integration to a hundred times `rtol`).
     strokes : tuple of Stroke
-        Motions between two rests; `begins` and `ends` are errors (target less position).
+        Motions between two rests; `begins` and `ends` are errors (target minus position).
     time, error, velocity, force : ndarray
         The motion: s; m or rad; m/s or rad/s; N, N m or Pa.
     exact : bool
@@ -285,7 +285,7 @@ class Hunt(ReadOnly):
         factor, force = outside(self.force_unit, self.rig.area)
         columns = {
             "time (s)": self.time,
-            f"target less place{self.at_body} ({self.unit})": self.error,
+            f"target minus position{self.at_body} ({self.unit})": self.error,
             f"speed ({self.unit}/s)": self.velocity,
             f"{self.force_label} ({force})": factor * self.force,
         }

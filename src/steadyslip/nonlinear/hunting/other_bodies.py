@@ -16,13 +16,13 @@ from steadyslip.nonlinear.hunting.plant import Array, Plant
 
 @dataclass(frozen=True)
 class BodySwing(Displayed):
-    """Extremes of position less target of a body with friction; its target is the drive's, as in steady motion.
+    """Extremes of position minus target of a body with friction; its target is that of the drive, as in steady motion.
 
     Attributes
     ----------
     body : str
     lowest, highest : float
-        Extremes of position less target, over the time of `Hunt.lowest`; m or rad.
+        Extremes of position minus target, over the time of `Hunt.lowest`; m or rad.
     unit : str
     """
 
@@ -55,7 +55,7 @@ def other_bodies(rig: Rig) -> dict[str, float]:
 
 
 def rows_of(rig: Slider | Machine, plant: Plant) -> list[Array]:
-    """Rows (width,) that give the errors (target less position) of the other bodies from the state of a plant."""
+    """Rows (width,) that give the errors (target minus position) of the other bodies from the state of a plant."""
     names = [one.name for one in rig.mechanism().coordinates]
     return [
         plant.row(-np.eye(plant.size)[names.index(body)], target=ratio) for body, ratio in other_bodies(rig).items()

@@ -199,7 +199,7 @@ class Motion:
             one.name == "contact" and bool(self.mode.contacts[one.number]) and not self.plant.contacts[one.number].slow
             for one in switches
         ]
-        noise[np.array(begun, dtype=bool) & fresh, 0] = np.inf  # a slip rate that is 0 but for rounding
+        noise[np.array(begun, dtype=bool) & fresh, 0] = np.inf  # a slip rate that is 0 apart from rounding
         crossed = first_crossing(guards, fresh, noise) if len(rows) else None
         share = 1.0 if crossed is None else crossed[0]
         if share > 0:

@@ -123,7 +123,7 @@ def _monomials(n: int, order: int) -> tuple[tuple[Array, ...], Array]:
 
 
 def _cancelling(slope: Array, roots: Array) -> Array:
-    """Form (m, n, ..., n) whose time derivative in linear motion is −`slope`, but for resonant terms."""
+    """Form (m, n, ..., n) whose time derivative in linear motion is −`slope`, except for resonant terms."""
     order, even = slope.ndim - 1, np.zeros_like(slope)
     rates, sizes = np.zeros_like(slope), np.zeros(slope.shape)
     for k in range(order):

@@ -38,7 +38,12 @@ COARSE = 192  # number of sizes in the first scan
 BLOCK = 48  # number of sizes simulated side by side
 FINE = 47  # number of sizes between the ends of a bracket in each round of narrowing
 AT_EDGE = 1e-5  # least relative width of a bracket at an edge of stability, near which motions return very slowly
-LASTING = ("velocity", "normal-stress", "normal-force", "force")  # kicks that change an input for good, but for blows
+LASTING = (
+    "velocity",
+    "normal-stress",
+    "normal-force",
+    "force",
+)  # kicks that change an input for good, except blows
 USED_UP = tuple(map(doubt_of, (LATE, EXHAUSTED, SPENT)))  # doubts of motions that would need more time or steps
 TOGETHER = 256  # number of steady slidings after kicks that are solved for together
 BITS = 60  # halvings of a bracket that reach rounding

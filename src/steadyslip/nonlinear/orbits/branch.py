@@ -274,7 +274,7 @@ class CycleBranch(Displayed):
         return stress_name(self.rig.result_name("stress swing"), self.rig.area)
 
     def swings(self) -> tuple[Array, str]:
-        """Highest less lowest pull in each cycle, and its unit: Pa, for a machine N, at a body that turns N m."""
+        """Highest minus lowest pull in each cycle, and its unit: Pa, for a machine N, at a body that turns N m."""
         levers = [self._lever(one) for one in self.cycles]
         unit = "N m" if any(one is not None for one in levers) else self.rig.result_unit("Pa")
         return np.array([one.stress_drop * (by or 1.0) for one, by in zip(self.cycles, levers, strict=True)]), unit

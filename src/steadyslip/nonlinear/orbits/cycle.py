@@ -42,7 +42,7 @@ class CycleRange(Displayed):
     amplitude : float
         Half of ln(peak velocity/lowest velocity); infinite where slip stops or reverses.
     force_drop : float
-        Highest less lowest pull, N.
+        Highest minus lowest pull, N.
     lowest_normal_force, highest_normal_force : float
         Extreme normal forces, N.
     """
@@ -70,8 +70,8 @@ class Cycle(Displayed):
     amplitude : float
         Half of ln(peak velocity/lowest velocity); infinite where the block stops or reverses.
     stress_drop : float
-        Highest less lowest spring stress in a period, Pa; the `stress_drop` of a `SlipEvent` ends where the block first
-        rests, and is smaller where later ringing reaches a lower stress.
+        Highest minus lowest spring stress in a period, Pa; the `stress_drop` of a `SlipEvent` ends where the block
+        first rests, and is smaller where later ringing reaches a lower stress.
     lowest_normal_stress, highest_normal_stress : float
         Extreme normal stresses, Pa.
     multipliers : tuple of complex

@@ -153,7 +153,7 @@ def closing_error(missed: Array, along: Array, period: float, amplitude: float) 
     Parameters
     ----------
     missed : ndarray (K, n)
-        Ends of the segments less the starts of the next, over their sizes.
+        Ends of the segments minus the starts of the next, over their sizes.
     along : ndarray (K, n)
         Rates of the state at these starts, over the same sizes (1/s).
     period : float

@@ -149,7 +149,7 @@ class Shooting:
         return orbit, self.flow.setting(orbit.value)
 
     def _residual(self, orbit: Orbit, setting: FlowSetting, ends: Array, start: Array) -> Array:
-        """Residuals (K n + 1,): segments' ends less next starts, scaled, and slip rate less its target at `start`."""
+        """Residuals (K n + 1,): segments' ends minus next starts, scaled, and slip rate minus its target at `start`."""
         missed = (ends - np.roll(orbit.states, -1, axis=0)) / np.roll(self._stretch(orbit), -1, axis=0)
         return np.append(missed.ravel(), setting.slip @ start / setting.speed)
 
@@ -187,7 +187,7 @@ def multipliers(sensitivities: Array, rates: Array) -> tuple[float, Array]:
     Returns
     -------
     trivial : float
-        The multiplier along the motion, 1 but for errors.
+        The multiplier along the motion, which is 1 apart from errors.
     others : ndarray (n-1,), complex
         By falling size.
 
@@ -220,7 +220,7 @@ def multipliers(sensitivities: Array, rates: Array) -> tuple[float, Array]:
 
 
 def _trivial(sensitivities: Array, along: Array) -> float:
-    """Factor by which one period multiplies the direction of motion `along` (K, n): 1 but for errors."""
+    """Factor by which one period multiplies the direction of motion `along` (K, n): 1 apart from errors."""
     ends = np.einsum("kij,kj->ki", sensitivities, along)
     starts = np.roll(along, -1, axis=0)
     return float(np.prod(np.sum(starts * ends, axis=1) / np.sum(starts * starts, axis=1)))

@@ -14,6 +14,7 @@ import steadyslip as ss
 from steadyslip.experiments.fitting.at_minimum import fit_with_errors
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.fitting.valleys import along_valleys
 from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe, first_order
 from steadyslip.experiments.numerics.pooling import spread_of_chains
@@ -315,6 +316,30 @@ def test_errors_along_a_valley_are_as_long_as_the_valley(seed):
     for name in VALLEY:
         one, value = fit[name], truth[name]
         assert not one.determined or one.low < value < one.high, one
+
+
+def soft_fit(seed):
+    """Fit of a record of a press at 2.45 of the critical stiffness, with white noise."""
+    source = lab.rig(ss.laws.Aging(), a=0.01255, b=0.01341, d_c=7.18e-6).with_values(
+        {"slider.stiffness": 1.24e9, "contact.steady_normal_stress": 4.2e6}
+    )
+    pieces = tuple(ss.protocol.VelocityStep(at=at, to=to) for at, to in ((30.1, 3e-6), (59.1, 1e-6)))
+    record = lab.record(source, ss.Protocol(pieces=pieces, until=145.0), seed, 1e-3, count=354)
+    return ss.fit(ss.lab_rig("aging"), record, errors="independent")
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(2, 8))])
+def test_a_valley_longer_than_its_curvature_lessens_no_error(seed):
+    """Whatever follows from the parameters, a - b too, is known no better than without the length of the valley."""
+    fit = soft_fit(seed)
+    rows = fit.comparison.residuals(fit.coordinates[None])[1][0]
+    information = rows @ rows.T
+    linear = fit.ssq / fit.degrees * np.linalg.inv(information)
+    wider = along_valleys(fit.plan, fit.comparison, fit.coordinates, fit.bounds, information, linear)[0]
+    known = np.isfinite(np.diag(wider))
+    gained = (wider - linear)[np.ix_(known, known)] / np.outer(size := np.sqrt(np.diag(linear)[known]), size)
+    assert np.min(np.linalg.eigvalsh(gained)) > -1e-9
+    assert np.max(gained) > 0.2
 
 
 def test_a_normal_stress_history_leaves_one_direction_open():

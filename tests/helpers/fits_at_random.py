@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,15 +83,16 @@ def rig_of(rng: np.random.Generator, law: str, alpha: float | None = None) -> ss
 
 
 def simulated(
-    rng: np.random.Generator, rig: ss.Slider, protocol: ss.Protocol, samples: int, times: np.ndarray | None = None
-) -> dict[str, np.ndarray]:
+    rng: np.random.Generator, rig: ss.Slider, protocol: ss.Protocol, samples: int, times: np.ndarray | None = None,
+    least: float = 1e-4,
+) -> dict[str, np.ndarray]:  # fmt: skip
     """Columns with correlated noise in friction and in displacement; normal stress with white noise."""
     times = np.linspace(0.0, protocol.until, samples) if times is None else times
     run = ss.simulate(rig, protocol, times=times, rtol=1e-9, events=False)
     if run.status != "done" or np.max(run["v"]) > 300 * np.max(run["load_velocity"]):
         raise ValueError("a burst: a matter of inertia")
     shear, normal, moved = (np.asarray(run[name]) for name in SEEN)
-    size = 10 ** rng.uniform(-4, -3.4)
+    size = 10 ** rng.uniform(np.log10(least), -3.4)
     sensor = 10 ** rng.uniform(-8.3, -7.3)
     return {
         "time": times,
@@ -157,6 +158,21 @@ def pressed(rng: np.random.Generator, kind: str) -> Drawn:
     return Drawn(rig, law, ss.record_from_arrays(**columns, source=kind))
 
 
+def soft(rng: np.random.Generator, kind: str) -> Drawn:
+    """Two steps of a soft press, at 2 to 3 of the critical stiffness; few samples of its swings."""
+    law = rng.choice(["slip", "aging"])
+    a, d_c, stress = rng.uniform(0.008, 0.014), 10 ** rng.uniform(-5.3, -5), 10 ** rng.uniform(6.5, 7)
+    rig = rig_of(rng, law).with_values(
+        {"friction.a": a, "friction.b": a * rng.uniform(1.05, 1.08), "friction.d_c": d_c}
+    )
+    rig = rig.with_values({"contact.steady_normal_stress": stress})
+    rig = rig.with_values({"slider.stiffness": float(ss.critical_stiffness(rig)) * rng.uniform(2, 3)})
+    times = np.array([30, 59, 145]) * d_c / 7e-6 * rng.uniform(0.98, 1.02, 3)
+    pieces = tuple(ss.protocol.VelocityStep(at=at, to=to * SLOW) for at, to in zip(times, (3, 1), strict=False))
+    columns = simulated(rng, rig, ss.Protocol(pieces=pieces, until=times[2]), 350, least=2.5e-4)
+    return Drawn(rig, law, ss.record_from_arrays(**columns, source=kind))
+
+
 def dirty(rng: np.random.Generator, kind: str) -> Drawn:
     """Steps with rows lost, a gap, wild samples, an uneven clock."""
     law = rng.choice(["slip", "aging"])
@@ -199,7 +215,7 @@ def holds(rng: np.random.Generator, kind: str) -> Drawn:
 DESIGNS: dict[str, Callable[[np.random.Generator, str], Drawn]] = {
     "steps": steps, "five": five, "stress": stress, "dirty": dirty, "holds": holds,
 } | {f"{law}, {cell}": servo_case for law in ("slip", "aging") for cell in (*SERVOS, *WAYS)}  # fmt: skip
-DESIGNS["pressed"] = pressed  # the place of a kind in the table seeds it
+DESIGNS |= {"pressed": pressed, "soft": soft}  # the place of a kind in the table seeds it
 
 
 def drawn(kind: str, count: int, seed: int) -> Iterator[Drawn]:
@@ -224,7 +240,7 @@ def outcome(one: Drawn) -> Outcome:
         estimate.name.split(".")[-1]: fit_deviation(fit, i, truth[estimate.name])
         for i, estimate in enumerate(fit.estimates)
         if estimate.name in truth and estimate.determined and estimate.name != "friction.mu_ref"
-    }
+    } | derived_deviations(fit, truth)
     servo = any(change.lag or change.pieces for loading in fit.plan.loading for _, _, change in loading.changes)
     return Outcome(z, seconds, servo, fit.whiteness.p, fit.ssq)
 
@@ -233,6 +249,23 @@ def fit_deviation(fit: ss.experiments.Fit, i: int, truth: float) -> float:
     """Estimate less truth, in standard errors of the coordinate in which errors are computed."""
     coordinate = fit.space.unknowns[i].coordinate(truth)
     return float((fit.coordinates[i] - coordinate) / np.sqrt(fit.covariance[i, i]))
+
+
+def derived_deviations(fit: ss.experiments.Fit, truth: Mapping[str, float]) -> dict[str, float]:
+    """Estimates of quantities that follow from parameters, less the truth, in standard errors; of k_c in its logarithm.
+
+    Times of changes do not matter for them.
+    """
+    pairs = zip(fit.space.unknowns, fit.coordinates, strict=True)
+    true = fit.derived_at(np.array([[u.coordinate(truth.get(u.parameter, u.value(c))) for u, c in pairs]]))
+    found = {}
+    for one in fit.derived:
+        is_log = one.name != "a - b"
+        off, error = (np.log(one.value / true[one.name][0]), one.error / one.value) if is_log else (
+            one.value - true[one.name][0], one.error)  # fmt: skip
+        if np.isfinite(off):
+            found[one.name] = float(off / error)
+    return found
 
 
 def main(kind: str, count: int, seed: int) -> None:

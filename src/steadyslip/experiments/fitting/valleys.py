@@ -79,10 +79,11 @@ def along_valleys(
     reached, near = _reached(plan, comparison, z, bounds, valley, unit)
     known = np.isfinite(np.diag(covariance)) & (valley.share >= 0)
     part = np.where(known, reached**2 / np.maximum(np.diag(covariance), 1e-300), 0.0)  # of its variance
-    stretch = np.where(known, np.sqrt(np.maximum(1 - valley.share + part, 1.0)), 1.0)
-    stretch[stretch < LEAST_STRETCH] = 1.0
     deviation = float(np.linalg.norm(reached[known]))
-    wider = np.where(np.isfinite(covariance), covariance * np.outer(stretch, stretch), covariance)
+    stretch = deviation / float(np.linalg.norm(valley.axis))
+    wider = covariance.copy()
+    if stretch >= LEAST_STRETCH:  # one factor for all: different ones would add errors to a - b, or cancel its own
+        wider += (stretch**2 - 1) * np.outer(valley.axis, valley.axis)
     if deviation <= UNDETERMINED:
         return wider, (), near
     lost = (part > OPEN_SHARE) & (reached > LEAST_CHANGE)

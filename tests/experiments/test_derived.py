@@ -113,7 +113,7 @@ def test_without_a_displacement_the_rate_is_asked_for_and_named():
     assert fit.values["friction.a"] == pytest.approx(0.011, rel=0.01)
     text = " ".join(str(fit).split())
     assert "the given protocol, from 3 um/s on" in text
-    assert "taken to move at 3 um/s (drive.velocity)" in text
+    assert "assumed to move at 3 um/s (drive.velocity)" in text
 
 
 def test_derived_numbers_have_intervals_and_b_less_a_is_the_negative():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import lab_records as lab
 import minima_at_random as campaign
 import steadyslip as ss
 from steadyslip.experiments.fitting.effort import Effort
@@ -53,3 +54,11 @@ def test_what_differs_in_minima_that_fit_as_well_has_no_error(which, once):
 @pytest.mark.campaign
 def test_few_values_after_one_step_of_the_stress_are_far_off_at_random():
     assert sum(bool(campaign.far_off(one, campaign.below(one)[0])) for one in campaign.drawn("single", 12, 2)) <= 1
+
+
+@pytest.mark.parametrize(("a", "doubtful"), [(0.1, False), (0.3, True)])
+def test_an_effect_that_no_rock_has_is_asked_about(a, doubtful):
+    """One step of the stress was followed with b = 2.7 and a slip distance that is never slid, and a 11 errors off."""
+    record = lab.record(lab.rig(a=a, b=0.9 * a), lab.STEP, count=300)
+    said = " ".join(str(search_fit(ss.lab_rig(), record, starts=3)).split())
+    assert ("friction.a = 0.3" in said and "in a limit that no rock reaches" in said) is doubtful

@@ -261,7 +261,7 @@ def compare_laws(
         if not fits:
             raise NotAvailable(f"none of the laws can follow these records from any start: {'; '.join(refused)}")
         fits |= {label: refit_from(own, [f for f in fits.values() if f is not own]) for label, own in fits.items()}
-        for label in [label for label in _candidates(fits) if fits[label].search.cut]:
+        for label in [label for label in _candidates(fits) if _may_be_missed(fits[label])]:
             fitted(label, effort)
         predicted = {label: cross_validate(fits[label]).rms for label in _candidates(fits)}
     except KeyboardInterrupt:
@@ -269,6 +269,11 @@ def compare_laws(
             raise
     left_out = tuple(label for label in rigs if label not in (*fits, *refused))
     return replace(_in_order(fits), left_out=left_out, refused=tuple(refused), predicted=predicted)
+
+
+def _may_be_missed(one: Fit) -> bool:
+    """True if a search with more work might find a better minimum: its budget was spent before enough starts agreed."""
+    return one.search.cut and (one.search.is_chance or not one.search.converged)
 
 
 def _candidates(fits: Mapping[str, Fit]) -> list[str]:

@@ -24,6 +24,7 @@ PART_OF_PRESS = 5.0
 """A sensor is across the fault if the spring behind it is less stiff than this multiple of the machine. Springs found
 for sensors across the fault were .8 to 2 times as stiff; two that were due to noise were 8 and 32 times as stiff."""
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
+USUAL_EFFECT = 0.2  # sizes of a and b found in laboratories are below .1, of polymers and ice too
 OTHER_UNIT = 20.0  # ratio to the calibrated stiffness from which a unit is wrong: lags and servos change it by 2
 CALIBRATED = 0.1  # smaller relative differences from a calibration are not reported: calibrations are no better
 WAVY = 4.0  # waves are reported if a displacement wanders by this multiple of its sample-to-sample noise
@@ -35,7 +36,7 @@ LISTED = 4  # most changes listed in a warning
 def loading_warnings(fit: FitNumbers) -> list[str]:
     """Warnings on the loading, each a sentence."""
     found = _assumed_rate(fit) + _against_protocol(fit) + _loading_outliers(fit) + _across_fault(fit)
-    found += _small_changes(fit) + _waves(fit) + _unusual_distances(fit) + _off_calibration(fit)
+    found += _small_changes(fit) + _waves(fit) + _unusual_values(fit) + _off_calibration(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     return found
@@ -224,16 +225,39 @@ def _off_calibration(fit: FitNumbers) -> list[str]:
     return found
 
 
-def _unusual_distances(fit: FitNumbers) -> list[str]:
-    """Warning on slip distances that no rock has, which a displacement in a wrong unit may cause."""
-    distances = fit.plan.rig.of_kind("slip distance")
-    found = {name: size for name, size in fit.values.items() if name.partition("@")[0] in distances}
+def _unusual_values(fit: FitNumbers) -> list[str]:
+    """Warnings on slip distances, and on effects of velocity and state, that are beyond what laboratories find."""
+    found = []
     low, high = USUAL_DISTANCES
-    odd = [f"{name} = {format_quantity(size, 'm')}" for name, size in found.items() if not low <= size <= high]
-    if not odd:
-        return []
-    usual = f"{format_quantity(low, 'm')} to {format_quantity(high, 'm')}"
-    return [f"{enumerated(odd)}: laboratories find {usual}; is the displacement in the unit named in its column?"]
+    odd = [
+        f"{name} = {format_quantity(size, 'm')}"
+        for name, size in _fitted_of_kind(fit, "slip distance")
+        if not low <= size <= high
+    ]
+    if odd:
+        usual = f"{format_quantity(low, 'm')} to {format_quantity(high, 'm')}"
+        found.append(
+            f"{enumerated(odd)}: laboratories find {usual}; is the displacement in the unit named in its column?"
+        )
+    effects = [
+        f"{name} = {size:.3g}"
+        for kind in ("direct effect", "evolution effect")
+        for name, size in _fitted_of_kind(fit, kind)
+        if abs(size) > USUAL_EFFECT
+    ]
+    if effects:
+        found.append(
+            f"{enumerated(effects)}: laboratories find less than {USUAL_EFFECT:g}; the law follows these records only "
+            "in a limit that no rock reaches, so that its other values are doubtful too; give (fix) what is known, or "
+            "fit another law"
+        )
+    return found
+
+
+def _fitted_of_kind(fit: FitNumbers, kind: str) -> list[tuple[str, float]]:
+    """Names and values of the fitted parameters of a kind."""
+    own = fit.plan.rig.of_kind(kind)
+    return [(name, size) for name, size in fit.values.items() if name.partition("@")[0] in own]
 
 
 def own_rate(fit: FitNumbers) -> str:

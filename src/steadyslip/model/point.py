@@ -256,9 +256,10 @@ def checked_arrays(rig: Rig, vary: Vary) -> BroadcastArrays:
             full = rig.resolve(name)
             checked[full] = checked_array(full, known[full].role, rig.read(full, value))
             if known[full].role.adds_state and np.any(np.asarray(checked[full]) == 0):
-                raise ParameterError(
-                    [Problem(full, "got 0; without this term the rig has fewer states, ask for it apart")]
+                message = (
+                    "got 0, at which the rig has fewer states; leave 0 out and compute that case in a separate call"
                 )
+                raise ParameterError([Problem(full, message)])
             if known[full].value is None and full not in rig.always_symbols:
                 raise ParameterError([Problem(full, "cannot be varied: the rig does not have it")])
             for name, other in rig.replaces.items():

@@ -285,7 +285,7 @@ def highest_coefficients(model: Model) -> list[list[Pair]]:
 
 
 def highest_is_lost(levels: Sequence[Sequence[Pair]], choose: Choose = np.where) -> Any:
-    """1 where the highest coefficient (of `highest_coefficients`) vanishes only by underflow, else 0.
+    """1 where the highest coefficient (of `highest_coefficients`) is 0 only because of underflow, else 0.
 
     A term with a delay counts above the highest power without delay: there it makes the equation ill-posed.
 

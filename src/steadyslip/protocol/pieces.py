@@ -23,7 +23,7 @@ FORCES = ("N", "N m")
 
 
 class StressStep(Piece):
-    """The stress changes at once and stays so."""
+    """The stress changes suddenly, then remains constant."""
 
     at: float = parameter("s", nonnegative, "time of the step")
     by: float = parameter("Pa", real, "change of the stress", elsewhere=FORCES)
@@ -44,7 +44,7 @@ class StressPulse(Piece):
 
 
 class StressRamp(Piece):
-    """The stress changes at a constant rate for some time and stays so."""
+    """The stress changes at a constant rate for some time, then remains constant."""
 
     at: float = parameter("s", nonnegative, "start of the ramp")
     by: float = parameter("Pa", real, "change of the stress in all", elsewhere=FORCES)
@@ -116,7 +116,7 @@ def table_problems(time: Sequence[float], name: str, values: Sequence[float]) ->
 
 
 class VelocityStep(Piece, name="velocity-step"):
-    """The load-point velocity changes at once and stays so."""
+    """The load-point velocity changes suddenly, then remains constant."""
 
     at: float = parameter("s", nonnegative, "time of the step")
     to: float = parameter("m/s", real, "velocity from then on", elsewhere=("rad/s",))
@@ -126,7 +126,7 @@ class VelocityStep(Piece, name="velocity-step"):
 
 
 class VelocityRamp(Piece, name="velocity-ramp"):
-    """The load-point velocity changes at a constant rate from its present value to another, and stays so."""
+    """The load-point velocity changes at a constant rate from its present value to another, then remains constant."""
 
     at: float = parameter("s", nonnegative, "start of the ramp")
     to: float = parameter("m/s", real, "velocity at its end", elsewhere=("rad/s",))
@@ -274,11 +274,11 @@ class OnDrive(Piece):
 
 
 class CreepStep(StressStep, OnDrive, name="creep-step"):
-    """The drive pulls with a constant stress, which changes at once and stays so."""
+    """The drive pulls with a constant stress, which changes suddenly to a new value."""
 
 
 class CreepRamp(StressRamp, OnDrive, name="creep-ramp"):
-    """The drive pulls with a stress that grows at a constant rate for some time and stays so."""
+    """The drive pulls with a stress that grows at a constant rate for some time, then remains constant."""
 
 
 class CreepTable(StressTable, OnDrive, name="creep-table"):
@@ -286,7 +286,7 @@ class CreepTable(StressTable, OnDrive, name="creep-table"):
 
 
 class InjectionStep(StressStep, OnPores, name="injection-step"):
-    """The pressure around a contact with pore fluid changes at once and stays so."""
+    """The pressure around a contact with pore fluid changes suddenly, then remains constant."""
 
 
 class InjectionPulse(StressPulse, OnPores, name="injection-pulse"):
@@ -294,7 +294,7 @@ class InjectionPulse(StressPulse, OnPores, name="injection-pulse"):
 
 
 class InjectionRamp(StressRamp, OnPores, name="injection-ramp"):
-    """The pressure around a contact with pore fluid changes at a constant rate for some time and stays so."""
+    """The pressure around a contact with pore fluid changes at a constant rate for some time, then remains constant."""
 
 
 class InjectionHarmonic(Harmonic, OnPores, name="injection-harmonic"):
@@ -306,7 +306,7 @@ class InjectionTable(StressTable, OnPores, name="injection-table"):
 
 
 class NormalStressStep(StressStep, OnNormalStress, name="normal-stress-step"):
-    """The normal stress changes at once and stays so."""
+    """The normal stress changes suddenly, then remains constant."""
 
 
 class NormalStressPulse(StressPulse, OnNormalStress, name="normal-stress-pulse"):
@@ -314,7 +314,7 @@ class NormalStressPulse(StressPulse, OnNormalStress, name="normal-stress-pulse")
 
 
 class NormalStressRamp(StressRamp, OnNormalStress, name="normal-stress-ramp"):
-    """The normal stress changes at a constant rate for some time and stays so."""
+    """The normal stress changes at a constant rate for some time, then remains constant."""
 
 
 class NormalStressHarmonic(Harmonic, OnNormalStress, name="normal-stress-harmonic"):
@@ -334,7 +334,7 @@ class DisturbancePulse(StressPulse, OnBlock, name="disturbance-pulse"):
 
 
 class DisturbanceRamp(StressRamp, OnBlock, name="disturbance-ramp"):
-    """A stress that pushes the block grows at a constant rate for some time and stays so."""
+    """A stress that pushes the block grows at a constant rate for some time, then remains constant."""
 
 
 class DisturbanceHarmonic(Harmonic, OnBlock, name="disturbance-harmonic"):

@@ -318,6 +318,6 @@ class Kicked:
         return self._started(jobs, struck(jobs.point, self.at, change))
 
     def _started(self, jobs: Jobs, given: Mapping[str, Any]) -> Jobs:
-        """Jobs that start from other initial values."""
+        """Jobs that start from given initial values in place of steady sliding."""
         initial, speed = initial_values(jobs.reduction, jobs.point, given)
         return replace(jobs, initial=initial, velocity=speed)

@@ -299,7 +299,7 @@ def test_sepiolite_strengthens():
     assert 0.7 < fit.noise[0].lag1 < 0.9
     said = " ".join(str(fit).split())  # friction rises faster and later than the law can
     assert "step.1.at ended at the smallest value" in said
-    assert "friction would have the change earlier than the record's other columns allow" in said
+    assert "by friction the change is earlier than the record's other columns allow" in said
 
 
 # -- which law

@@ -266,7 +266,7 @@ def test_a_step_of_normal_stress_alone_leaves_open_what_no_memory_would_tell():
     assert free.interval("alpha")[0] <= 0.2 <= free.interval("alpha")[1]
     found = ss.experiments.compare({"none": none, "free": free})
     assert found.best == "free"
-    assert "the records do not tell friction.normal_memory.alpha: 'none' has" in found.verdict
+    assert "the records do not determine friction.normal_memory.alpha: 'none', which lacks it, has" in found.verdict
 
 
 def test_memories_that_fit_far_worse_are_soon_given_up(monkeypatch):

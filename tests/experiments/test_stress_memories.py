@@ -75,7 +75,7 @@ def test_a_file_that_says_nothing_of_it_has_the_memories_compared():
     best = found.fits[found.best]
     assert near(best, "alpha", ALPHA)
     assert near(best, "a", lab.TRUTH["a"])
-    assert "'slip, linker-dieterich' it is" in str(found)
+    assert "'slip, linker-dieterich' is the best" in str(found)
 
 
 @pytest.mark.campaign

@@ -27,10 +27,10 @@ from steadyslip.protocol.pieces import Harmonic
 
 
 class SwingingInput(NamedTuple):
-    """Names of one kind of input in the Models of sliders and machines, and the protocol piece that oscillates it."""
+    """Names of an oscillating input in the Model of a slider and of a machine, and the protocol piece for it."""
 
-    slider: str  # empty if the name in a slider is `machine`, after the empty name of its contact
-    machine: str  # ending, after the name of a body or contact; the whole name for the drive
+    slider: str  # such as "disturbance"; empty if a slider's input has only the ending as name, such as ".pores"
+    machine: str  # ending after the name of a body or contact: ".push" of "table.push"; for the drive the whole name
     piece: type[Harmonic]
 
 
@@ -40,18 +40,18 @@ INPUTS = {
     "push": SwingingInput("disturbance", ".push", DisturbanceHarmonic),
     "injection": SwingingInput("", ".pores", InjectionHarmonic),
 }
-SAMPLES = 256  # per period: harmonics up to the 127th are resolved
-LEAST_PERIODS, MOST_PERIODS = 10, 2560  # simulated until motion repeats; doubled from the first to the second
-SETTLED = 1e-7  # difference of two periods, over the output's range, below which the motion is periodic
-FAINT = 1e-5  # as SETTLED, where integration errors hide smaller differences, and after MOST_PERIODS
-ROUGHLY = 1e-4  # as SETTLED, for limits of amplitude, which are found to 5 %
+SAMPLES = 256  # samples of the motion per period of the input: harmonics up to the 127th are resolved
+LEAST_PERIODS, MOST_PERIODS = 10, 2560  # simulated periods: doubled from the first to the second until motion repeats
+SETTLED = 1e-7  # largest difference of two periods, over the output's range, at which the motion counts as periodic
+FAINT = 1e-5  # used instead of SETTLED where integration errors hide smaller differences, and after MOST_PERIODS
+ROUGHLY = 1e-4  # used instead of SETTLED in the search for limits of amplitude, which are needed to 5 % only
 DEPARTED = 0.05  # relative deviation from the small-amplitude gain at which the gain counts as nonlinear
 MOST_FADED = 700.0  # largest exponent of e within the range of floating point
 IRREGULARLY = 1e-2  # difference of periods, over the output's range, above which motion counts as irregular
 TIGHTER, TIGHTEST = 100, 1e-12  # factor by which rtol is reduced where integration errors dominate, and its least value
 MOST_SHARE = 0.99  # largest amplitude tried for limits, over the input's steady value: just below a change of sign
-DECADES = 3  # decades of amplitude searched below MOST_SHARE, and as many again where needed
-STEPS = 12  # amplitudes tried upwards over that range, each 1.8 times the one before: a narrower window may be missed
+DECADES = 3  # decades of amplitude below MOST_SHARE that are searched, and as many decades below these where needed
+STEPS = 12  # number of amplitudes tried in that range, each 1.8 times the last: narrower windows may be missed
 HALVINGS = 4  # bisections of the logarithm of amplitude within a step of amplitude: limits are right to 4 %
 RISING = Measured(
     "numbers > 0 that rise", lambda given: _positive(given) and bool(np.all(np.diff(np.ravel(given)) > 0)), "s"

@@ -154,11 +154,11 @@ class FrequencyResponse(ReadOnly):
         return f"{self.output} under {self.input}" + (f" at {self.on}" if self.on else "")
 
     def told(self, amplitude: float) -> str:
-        """Format an amplitude of the input for display."""
+        """Text of an amplitude of the input, with its display unit."""
         return format_quantity(amplitude, self.units[0], area=self._area)
 
     def _gain(self, gain: float) -> str:
-        """Format a gain: per MPa of a stress, per unit of another input; a number if the units are equal."""
+        """Text of a gain: output per MPa of an input stress, or per unit of other inputs; a number if units agree."""
         factor, unit = self.gain_unit
         if not unit:
             return f"{factor * gain:.5g}"
@@ -176,7 +176,7 @@ class FrequencyResponse(ReadOnly):
         )
 
     def _explained(self) -> list[str]:
-        """One explaining line for each status in the tables other than ``periodic``."""
+        """Lines of text that explain the statuses in the tables, one for each status other than ``periodic``."""
         found = dict.fromkeys(self.status.ravel().tolist())
         return [f"{one}: {self._explanation(one)}" for one in found if one != PERIODIC]
 
@@ -186,7 +186,7 @@ class FrequencyResponse(ReadOnly):
         return EXPLAINED.get(status) or remedy(status, self.rig)
 
     def _limits_at(self, i: int) -> str:
-        """Format both limits of amplitude at period `i`; empty if limits were not computed."""
+        """Text of the amplitudes `linear_to` and `lost_at` at the period of index `i`; empty if not computed."""
         ends = [self.told(one[i]) if np.isfinite(one[i]) else BEYOND for one in (self.linear_to, self.lost_at)]
         return "" if np.isnan(self.linear_to[i]) else ", linear to {}, lost from {}".format(*ends)
 
@@ -244,12 +244,12 @@ class FrequencyResponse(ReadOnly):
 
 
 def _some(count: int) -> list[int]:
-    """Evenly spread indices of at most `MOST_ROWS` of `count` rows."""
+    """Indices of the table rows that are printed: at most `MOST_ROWS` of `count`, evenly spread."""
     return sorted({round(i) for i in np.linspace(0, count - 1, min(count, MOST_ROWS))})
 
 
 def _plain(values: Array) -> Any:
-    """Nested lists for JSON; values that are not finite become null."""
+    """Convert an array to nested lists for JSON, with None in place of values that are not finite."""
     found = values.astype(object)
     found[~np.isfinite(values)] = None
     return found.tolist()

@@ -138,13 +138,13 @@ def source_text(source: Path | None) -> str:
 
 
 def _listings(parts: Parts, sources: Sequence[Path]) -> list[str]:
-    """Texts of the files to list: that of the rig, or without a single rig those of all `sources`."""
+    """Texts of the files to list: only that of the rig, or those of all `sources` if `parts.rig` is None."""
     texts = map(source_text, sources) if parts.rig is None else [_rig_listing(parts, next(iter(sources), None))]
     return [text for text in texts if text]
 
 
 def _rig_listing(parts: Parts, source: Path | None) -> str:
-    """Text of the rig's file: that at `source`, with comments and units, if it has this rig; else generated."""
+    """Text of the rig's file: the file `source`, with comments and units, if it has this rig; else a generated text."""
     own = source_text(source)
     if not own or source is None or parts.rig is None:
         return parts.rig_file

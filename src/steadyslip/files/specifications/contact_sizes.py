@@ -1,6 +1,6 @@
 """Warnings of implausible sizes at contacts: loads, bristles, Stribeck velocities, viscosity, radii.
 
-Each compares a value with other values of the file, by a bound of physics or by measured ranges.
+Each warning compares a value with other values of the file, by a bound of physics or by measured ranges.
 """
 
 from __future__ import annotations
@@ -28,18 +28,21 @@ from steadyslip.machine.rig import Rig
 
 G = 9.81  # m/s^2
 LIGHT = 0.01  # least plausible load as share of the body's weight: hanging and floating bodies have some 1 %
-OTHER_LOAD = 100.0  # largest plausible ratio of the load given with bristles to the contact's own, or its reciprocal
-THIN, THICK = 1e-8, 1e-3  # m: range of bends at which bristles slip; measured are 0.1 um to 0.1 mm, more for rubber
-TURNED = 1.0  # rad: largest bend of bristles on a turning body, such as a motor in front of its gear
-OVERDAMPED = 3.0  # times the critical damping of a mass on its bristles; published are 0.1 to 1
-UNCHANGED = 1e3  # Stribeck velocity over sliding speed above which friction is still that at rest
-SLOW_LAW = 1e-6  # m/s: measured Stribeck velocities are 0.1 mm/s to 1 m/s
-FASTEST = 300.0  # m/s: nothing meant to go on sliding is faster
-WIDE = 100.0  # times the radius of a steel ball of equal inertia: light rims and arms have some 10 times
+OTHER_LOAD = 100.0  # largest ratio, either way, of the load given with a bristle stiffness to the contact's load
+THIN, THICK = 1e-8, 1e-3  # m: plausible bends of bristles at slip; measured bends are 0.1 um to 0.1 mm, more for rubber
+TURNED = 1.0  # rad: largest plausible bend of bristles on a turning body, such as a motor in front of its gear
+OVERDAMPED = 3.0  # largest plausible damping over the critical damping of a mass on its bristles; published: 0.1 to 1
+UNCHANGED = 1e3  # ratio of Stribeck velocity to sliding speed above which friction is nearly static friction
+SLOW_LAW = 1e-6  # m/s: least plausible Stribeck velocity; measured Stribeck velocities are 0.1 mm/s to 1 m/s
+FASTEST = 300.0  # m/s: largest plausible speed of a contact that slides for long
+WIDE = 100.0  # largest plausible radius of a contact over that of a steel ball of equal inertia; light rims: some 10
 
 
 def contact_warnings(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[SizeWarning]:
-    """Warnings of sizes at the contacts of a rig in forces, at most one for each parameter."""
+    """Warnings of sizes at the contacts of a rig whose loads are known as forces, at most one for each parameter.
+
+    The loads are known if the rig is given in forces, or in stresses with an area.
+    """
     light = list(_light(rig, read))
     yield from light
     if not light:
@@ -54,7 +57,7 @@ def contact_warnings(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> It
 
 
 def _light(rig: Rig, read: Read) -> Iterator[SizeWarning]:
-    """Warnings of loads with a unit that are far less than the body's weight."""
+    """Warnings of loads that are written with a unit and are far less than the weight of the sliding body."""
     for name in rig.of_kind("normal stress"):
         load, weight = rig.load_of(name), G * mass_on(rig, name)
         if not isinstance(read.get(name, (None, ""))[0], str) or is_of_forces(rig, name):
@@ -68,7 +71,7 @@ def _light(rig: Rig, read: Read) -> Iterator[SizeWarning]:
 
 
 def _bristles(rig: Rig, read: Read) -> Iterator[SizeWarning]:
-    """Warnings of bristles given for a load unlike the contact's, or that bend unlike all measured."""
+    """Warnings of bristle stiffnesses given at a load far from the contact's, or with bends far from measured ones."""
     for name in rig.of_kind("bristle stiffness"):
         raw, load, value = read.get(name, (None, ""))[0], rig.load_of(name), rig.value(name)
         if not isinstance(raw, str) or is_of_forces(rig, name) or not (load and value):
@@ -92,13 +95,13 @@ def _bristles(rig: Rig, read: Read) -> Iterator[SizeWarning]:
 
 
 def _bends_well(rig: Rig, name: str, bend: float) -> bool:
-    """True if a bend of bristles before slip (m) is within the plausible range."""
+    """True if the bend (m) that bristles reach before they slip is within the plausible range."""
     radius = rig.contacts[name.split(".")[1]].radius if rig.contacts else None
     return THIN <= bend <= (TURNED * radius if radius else THICK)
 
 
 def _unchanged(rig: Rig, read: Read) -> Iterator[SizeWarning]:
-    """Warnings of Stribeck velocities far above the sliding speed, or below all measured."""
+    """Warnings of Stribeck velocities that are far above the sliding speed, or below all measured velocities."""
     for prefix, *_ in rig.laws_by_contact().values():
         kinds = _kinds(rig, prefix)
         name = kinds.get("velocity scale", "")
@@ -141,7 +144,10 @@ def _viscous(rig: Rig, read: Read) -> Iterator[SizeWarning]:
 
 
 def _per_load(read: Read, name: str, si: str, load: float, fits: Callable[[float], bool]) -> list[str]:
-    """Texts of a value per load with its number in other units or, without a unit, as a total at the load (N)."""
+    """Texts of other values that may be meant by a value per load, which `fits` accepts.
+
+    A value written with a unit gets other units; a number without a unit is taken as the total at the load (N).
+    """
     raw = read[name][0]
     if isinstance(raw, str):
         total, at, of = raw.partition(" at ")
@@ -176,7 +182,7 @@ def _too_fast(rig: Rig, read: Read) -> Iterator[SizeWarning]:
 
 
 def _radii(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[SizeWarning]:
-    """Warnings of contact radii far outside the turning body; 1 m stands for an unknown radius."""
+    """Warnings of contact radii far larger than the turning body; a radius of 1 m counts as unknown and is skipped."""
     for name, surface in rig.contacts.items():
         body, radius, key = bodies.get(surface.held), surface.radius, f"contacts.{name}.radius"
         if body is None or not radius or not body.inertia or radius == 1.0 or key not in read:
@@ -188,7 +194,7 @@ def _radii(rig: Rig, read: Read, bodies: Mapping[str, HeldBody]) -> Iterator[Siz
 
 
 def _slip_speed(rig: Rig, prefix: str) -> float:
-    """Speed (m/s) of steady sliding at a contact; 0 if the drive holds a position or it is not known."""
+    """Speed (m/s) of steady sliding at a contact; 0 if the drive holds a position or the speed is not known."""
     if rig.holds:
         return 0.0
     if not rig.contacts:

@@ -44,7 +44,10 @@ class HeldBody(NamedTuple):
 
     @property
     def block(self) -> float:
-        """Stiffness of a steel cube of equal mass (N/m) or steel cylinder of equal inertia (N m/rad), long as thick."""
+        """Stiffness of a steel cube of equal mass (N/m) or, if the body turns, of a steel cylinder of equal inertia.
+
+        The cylinder is as long as it is thick, and its stiffness is torsional (N m/rad).
+        """
         if not self.turns:
             return YOUNG * math.cbrt(self.inertia / DENSITY)
         across: float = (32 * self.inertia / (math.pi * DENSITY)) ** 0.2
@@ -62,7 +65,10 @@ FIXED_END = HeldBody("", False, math.inf, 0.0, 0.0, 0.0, {})
 
 
 class HoldingSpring(NamedTuple):
-    """A spring between two bodies: stiffness at the second (N/m or N m/rad), ratio of speeds of second and first."""
+    """A spring between two bodies: stiffness felt at the second body, N/m or N m/rad, and the ratio of their speeds.
+
+    `ratio` is the speed of the second body over that of the first.
+    """
 
     stiffness: float
     ratio: float

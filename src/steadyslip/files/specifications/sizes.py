@@ -40,7 +40,9 @@ GEARED_UP = 10.0  # implausible number of turns of a heavier body per turn of it
 
 
 def size_warnings(rig: Rig, read: Read) -> Iterator[SizeWarning]:
-    """Warnings of implausible sizes of a rig, at most one per parameter; none for rigs in stresses or to be fitted.
+    """Warnings of implausible sizes of a rig, at most one for each parameter.
+
+    A rig given in stresses without an area, or with values to be fitted, gets only the warning of a missing gain.
 
     Parameters
     ----------

@@ -33,8 +33,8 @@ from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import STIFF, MotionBatch, StepBudget, continuous_at
 
 STEPS = 1e9  # limit of integration steps for all motions of one threshold: about a minute on two cores
-STEPS_OF_STRUCTURES = 2e8  # as STEPS, with structures; with the square of the number of variables: some 10 CPU s
-PATIENCE = 5.0  # factor on the longest simulated time, against that in a scan, for motions near the threshold
+STEPS_OF_STRUCTURES = 2e8  # as STEPS, for structures: some 10 CPU s; reduced by the square of the number of variables
+PATIENCE = 5.0  # motions near the threshold are simulated up to this many times as long as those of the first scan
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class Kicked:
 
     @property
     def _is_blow(self) -> bool:
-        """True if the kick is a jump of the velocity of a body."""
+        """True if the kick changes the velocity of a body suddenly (an impulse, or a velocity kick at a body)."""
         return self.kick.name == "impulse" or (self.kick.name == "velocity" and not self.of_drive)
 
     def amount(self, size: Any, which: Any = slice(None)) -> Array:
@@ -237,13 +237,13 @@ class Kicked:
 
     @property
     def moves_rest(self) -> bool:
-        """True if steady sliding after the kick differs from the rig's own."""
+        """True if the kick changes a constant input, so that steady sliding after the kick differs from that before."""
         if self.kick.name == "velocity":
             return self.of_drive and not self.from_other
         return self.kick.name in ("normal-stress", "normal-force", "force")
 
     def inputs(self, which: Array, sizes: Array) -> tuple[Array, Array, Array]:
-        """Load-point velocity, added normal stress and force after kicks, each (n,), SI units."""
+        """Constant inputs (n,) each, SI units, after kicks: load-point velocity, added normal stress, force."""
         velocity, nothing = self.drive[which], np.zeros(len(which))
         if not self.moves_rest:
             return velocity, nothing, nothing
@@ -253,7 +253,7 @@ class Kicked:
         return (velocity, nothing, amount) if self.kick.name == "force" else (velocity, amount, nothing)
 
     def rest_after(self, which: Array, sizes: Array) -> Rest:
-        """Steady sliding after kicks of `sizes` (n,) of rigs `which` (n,)."""
+        """The steady sliding that exists after kicks of `sizes` (n,) of the rigs with indices `which` (n,)."""
         if not self.moves_rest:
             return self.rest.part(which)
         return rest_of(self._jobs(which), *self.inputs(which, sizes))
@@ -264,7 +264,7 @@ class Kicked:
         return np.asarray(rest.exists & (rest.stable | rest.neutral))
 
     def runs(self, which: Array, sizes: Array, effort: float = 1.0) -> MotionBatch:
-        """Motions of rigs `which` (n,) after kicks of `sizes` (n,)."""
+        """Prepared motions, not simulated yet, of the rigs with indices `which` (n,) after kicks of `sizes` (n,)."""
         jobs, amount = self._jobs(which), self.amount(sizes, which)
         if self.moves_rest:
             rest = self.rest_after(which, sizes)
@@ -288,23 +288,23 @@ class Kicked:
         self, which: Array, sizes: Array, threads: int | None = None,
         advanced: Callable[[int], None] | None = None, effort: float = PATIENCE,
     ) -> Array:  # fmt: skip
-        """Outcomes (n,) of kicks `sizes` of rigs `which`, as indices into `OUTCOMES`; `effort` as in `MotionBatch`."""
+        """Simulate kicks of `sizes` (n,) of rigs `which` (n,), and return their outcomes as indices into `OUTCOMES`."""
         return outcomes_of(self.runs(which, sizes, effort), threads, advanced)
 
     def contacts(self, which: Array, sizes: Array, threads: int | None = None) -> Array:
-        """Name of the contact at which each kick leads to loss of contact or blow-up, (n,); else empty."""
-        runs = replace(self.runs(which, sizes), budget=StepBudget())  # to the ends that are known
+        """Names (n,) of the contacts that lose contact or blow up after each kick; empty for other outcomes."""
+        runs = replace(self.runs(which, sizes), budget=StepBudget())  # no limit of steps: the motions end
         return contacts_of(runs, np.arange(len(which)), threads)
 
     def _jobs(self, which: Array) -> Jobs:
-        """Jobs of the rigs `which` that start in steady sliding."""
+        """Simulation jobs of the rigs with indices `which`, each of which starts in its steady sliding."""
         return replace(
             self.jobs, point=self.jobs.point.part(which), initial=picked(self.jobs.initial, which),
             velocity=picked(self.jobs.velocity, which), size=len(which),
         )  # fmt: skip
 
     def _started_at(self, jobs: Jobs, velocity: Array) -> Jobs:
-        """Jobs that start in steady sliding at another velocity of the load point."""
+        """The jobs with their initial state replaced by steady sliding at the load-point `velocity` (m/s)."""
         nothing = np.zeros(len(velocity))
         before = rest_of(jobs, velocity, nothing)
         inputs = velocity, nothing, nothing
@@ -312,12 +312,12 @@ class Kicked:
         return replace(jobs, initial=initial, near=near)
 
     def _struck(self, jobs: Jobs, change: Array, which: Array) -> Jobs:
-        """Jobs that start with another velocity of the block or of a body."""
+        """The jobs with `change` added to the initial velocity of the kicked body: `at`, or the block of a slider."""
         if not self.at:
             return self._started(jobs, {"v": self.drive[which] + change})
         return self._started(jobs, struck(jobs.point, self.at, change))
 
     def _started(self, jobs: Jobs, given: Mapping[str, Any]) -> Jobs:
-        """Jobs that start from given initial values in place of steady sliding."""
+        """The jobs with the initial values of some variables replaced by those in `given` (SI units, by name)."""
         initial, speed = initial_values(jobs.reduction, jobs.point, given)
         return replace(jobs, initial=initial, velocity=speed)

@@ -28,13 +28,17 @@ from steadyslip.nonlinear.kicks.field import motion_at
 from steadyslip.nonlinear.kicks.quartic import REACH, Rays, terms
 from steadyslip.nonlinear.kicks.rest import Rest
 
-LARGEST, SMALLEST = 4.0, 1e-12  # limits of the radius, in natural sizes of the slowest mode
+LARGEST, SMALLEST = 4.0, 1e-12  # limits of the ball's radius |q|; 1 is the natural size of the slowest mode
 SHRINK = 0.6  # factor between successive trial radii
-LONG = 30.0  # ratio of slip to other variables, in natural sizes, above which a mode is scaled by the latter
-SPREAD = (0.0, 0.25, 0.5)  # a third of directions each: powers of decay time by which fast modes are reduced
-INNER = (0.75, 0.5, 0.25, 0.1)  # radii of inner shells that are checked too, over the ball's
-FEW = 8  # every 8th direction is tried first
-MARGIN = 0.5  # required share of the linear decay of V
+LONG = 30.0  # limit of a mode's slip over its other variables, in natural sizes; above it, slip does not scale the mode
+SPREAD = (
+    0.0,
+    0.25,
+    0.5,
+)  # powers of the decay time that scale the modes in a direction; each for a third of directions
+INNER = (0.75, 0.5, 0.25, 0.1)  # radii of the inner shells that are checked too, as shares of the ball's radius
+FEW = 8  # only every 8th direction is checked first, which is quick and excludes most radii
+MARGIN = 0.5  # share of the linear decay rate of V that V must reach in every direction
 
 
 class Neighbourhood:
@@ -59,10 +63,11 @@ class Neighbourhood:
         self.inverse = np.zeros((count, n, n))
         self.decay = np.ones((count, n))
         self.radius = np.where(rest.stable, np.nan, 0.0)
-        self.key, self.levels = np.arange(count), dict[int, list[Array]]()  # shared by copies of a rig
+        # motions of the same rig have the same key and share its level
+        self.key, self.levels = np.arange(count), dict[int, list[Array]]()
 
     def part(self, which: Array) -> Neighbourhood:
-        """Balls of some of the rigs."""
+        """The `Neighbourhood` of some of the rigs, with the indices `which`."""
         found = Neighbourhood(self.rest.part(which))
         for name in ("basis", "inverse", "decay", "radius", "key"):
             setattr(found, name, getattr(self, name)[which])
@@ -70,7 +75,7 @@ class Neighbourhood:
         return found
 
     def computed(self, which: Array | None = None) -> Array:
-        """Radii |q| (k,) of rigs `which` (k,), by default all, computed where they are not known yet."""
+        """Radii |q| (k,) of the balls of rigs `which` (k,), by default of all; unknown radii are computed."""
         which = np.arange(len(self.radius)) if which is None else which
         missing = np.unique(which[np.isnan(self.radius[which])])
         for start in range(0, len(missing), 512):
@@ -90,7 +95,7 @@ class Neighbourhood:
             return np.asarray(np.einsum("kij,kj->ki", self.inverse[which], away))
 
     def around(self, which: Array) -> Array:
-        """Unit vectors of q (k, d, n) along which V' of rigs `which` (k,) is checked."""
+        """Unit vectors (k, d, n) in q along which V' is checked for rigs `which` (k,)."""
         decay = self.decay[which]
         lessened = (np.min(decay, axis=1)[:, None] / decay)[:, None, :]
         even = directions(decay.shape[1])[None]
@@ -98,16 +103,16 @@ class Neighbourhood:
         return np.asarray(found / np.linalg.norm(found, axis=2)[:, :, None])
 
     def distance(self, which: Array, states: Array) -> Array:
-        """Distance |q| (k,) of states (k, n) of rigs `which` from steady sliding; inf where it is not finite."""
+        """Distance |q| (k,) from steady sliding of states (k, n) of rigs `which`; inf where it is not finite."""
         with np.errstate(all="ignore"):
             found = np.linalg.norm(self.coordinates(which, states), axis=1)
         return np.asarray(np.where(np.isfinite(found), found, np.inf))
 
     def holds(self, which: Array, states: Array, steps: Array | float = 0.0) -> Array:
-        """True (k,) for states (k, n) of rigs `which` inside their balls, or where V is below its level.
+        """True (k,) for states (k, n) of rigs `which` that lie inside their ball, or at which V is below its level.
 
-        A level costs as much as about n⁴ integration steps. It is computed if several of the motions need it, or if one
-        has taken as many `steps` (k,); until then a motion outside the ball counts as outside.
+        A level costs as much as about n⁴ integration steps. It is computed if several motions of a rig need it, or if
+        one motion has taken n⁴ `steps` (k,); until then a motion outside the ball counts as outside.
         """
         radius, away = self.computed(which), self.distance(which, states)
         inside = np.asarray(away < radius)
@@ -121,7 +126,7 @@ class Neighbourhood:
         return inside
 
     def _below(self, which: Array, states: Array) -> Array:
-        """True (k,) where V is below its level, which is computed for rigs where it is not known yet."""
+        """True (k,) where V at `states` is below its level; unknown levels of rigs are computed."""
         keys, first = np.unique(self.key[which], return_index=True)
         new = np.array([key not in self.levels for key in keys])
         if new.any():
@@ -134,7 +139,7 @@ class Neighbourhood:
         return np.asarray((rays.value(rho[:, None])[:, 0] < size**2) & (rho < rays.farthest[:, 0]))
 
     def _levels(self, which: Array) -> tuple[Array, Array, Array]:
-        """V3, V4, and the root of the level of V below which it falls; 0 where the ball is larger."""
+        """V3, V4, and the square root of the level below which V decreases; that root is 0 where the ball is larger."""
         v3, v4 = terms(self.rest.part(which), self.basis[which], self.inverse[which])
         known = np.all(np.isfinite(v3), axis=(1, 2, 3)) & np.all(np.isfinite(v4), axis=(1, 2, 3, 4))
         size, around = np.where(known, LARGEST, 0.0), self.around(which)
@@ -162,7 +167,7 @@ class Neighbourhood:
         return size
 
     def _falls(self, which: Array, q: Array, gradient: Array) -> Array:
-        """True (k,) where V falls at all q (k, d, n), by at least `MARGIN` times the linear rate of |q|²."""
+        """True (k,) where V decreases at all q (k, d, n), at least `MARGIN` times as fast as |q|² in linear motion."""
         rest = self.rest.part(which)
         away = q @ np.swapaxes(self.basis[which], 1, 2)
         rates, velocity = motion_at(rest, rest.state[:, None, :] + rest.scales[:, None, :] * away)
@@ -174,9 +179,11 @@ class Neighbourhood:
 
 
 def _largest(start: Array, least: Array, falls: Callable[[Array, Array], Array]) -> Array:
-    """Largest sizes (m,) of shells on and inside which V falls, tried downwards from `start`; 0 if below `least`.
+    """Largest sizes (m,) of shells on and inside which V decreases; 0 if smaller than `least`.
 
-    `falls(which, size)` is True (k,) where V falls on the shells of rigs `which` (k,) of given sizes (k,).
+    Sizes are tried downwards from `start`.
+
+    `falls(which, size)` is True (k,) where V decreases on the shells of rigs `which` (k,) with the sizes `size` (k,).
     """
     size = start.copy()
     trying = np.flatnonzero(size > 0)
@@ -195,10 +202,10 @@ def _largest(start: Array, least: Array, falls: Callable[[Array, Array], Array])
 
 
 def modes(rest: Rest) -> tuple[Array, Array, Array, Array]:
-    """Real weighted eigenvectors of stable steady sliding, slowest decay first.
+    """Modes of the linearised motion about stable steady sliding, as real weighted vectors, slowest decay first.
 
-    Modes are scaled to unit natural size of the state. A mode with a slip far larger than its velocity and memory is
-    scaled by the latter, as forces are linear in slip.
+    Each mode is scaled so that its largest variable has its natural size. Where slip exceeds the velocity and memory of
+    a mode by more than `LONG`, velocity and memory alone decide the scale, because forces are linear in slip.
 
     Returns
     -------
@@ -221,7 +228,7 @@ def modes(rest: Rest) -> tuple[Array, Array, Array, Array]:
     imaginary = np.abs(roots.imag) > 1e-12 * np.abs(roots)
     second = imaginary & (roots.imag < 0)
     decay = -roots.real
-    weight = (np.min(decay, axis=1)[:, None] / decay) ** 0.25  # so that V weighs squares by the root of the decay time
+    weight = (np.min(decay, axis=1)[:, None] / decay) ** 0.25  # so that V sums amplitude² · decay time^½
     with np.errstate(all="ignore"):
         vectors = vectors / size[:, None, :]
         columns = np.where(second[:, None, :], -vectors.imag, vectors.real) / weight[:, None, :]

@@ -41,16 +41,16 @@ from steadyslip.nonlinear.kicks.spans import (
     advanced_runs,
 )
 
-MOST_STEPS = 2_000_000  # integration steps, times the effort, after which a motion is undecided
+MOST_STEPS = 2_000_000  # integration steps after which a motion is undecided; multiplied by `MotionBatch.effort`
 EARLY, HALFWAY = (
     0.05,
     0.4,
-)  # share of the longest time after which cycles of several events are searched: sliding unstable, stable
-AT_ONCE = 1e-12  # share of the first span in which nothing moves noticeably
-ALIKE = 1e-2  # relative change of the time between slip events below which a cycle is searched for
-PEAKS = 40  # least number of velocity peaks in the last span of irregular oscillation
-HIGHER = 0.01  # relative excess of ln(velocity/drive) of these peaks over earlier ones that is allowed
-LEFT = 30.0  # least duration of irregular oscillation, growth times of unstable steady sliding
+)  # shares of the longest time after which cycles of several events are searched: unstable, stable sliding
+AT_ONCE = 1e-12  # share of the first span, so short that the state after it is the initial one; see `_return_at_once`
+ALIKE = 1e-2  # relative change of the time between slip events, from span to span, below which a cycle is searched for
+PEAKS = 40  # more velocity peaks than this in the last span are required to call a motion an irregular oscillation
+HIGHER = 0.01  # allowed relative excess of ln(velocity/drive) at these peaks over that at earlier peaks
+LEFT = 30.0  # least duration of an irregular oscillation, in growth times of small motions about unstable sliding
 CODE = {word: number for number, word in enumerate(STATUSES)}
 
 
@@ -58,15 +58,16 @@ def outcomes_of(
     runs: MotionBatch, threads: int | None = None, advanced: Callable[[int], None] | None = None,
     start: Array | None = None,
 ) -> Array:  # fmt: skip
-    """Outcomes (m,) of simulated motions, indices into `OUTCOMES`; from states `start` (m, n) if given.
+    """Simulate motions, and return their outcomes (m,) as indices into `OUTCOMES`.
 
-    `advanced` is called after each span with the number of further motions decided.
+    The motions start at the states `start` (m, n) if these are given. `advanced` is called after each span with the
+    number of motions that were decided in it.
     """
     return _Course(runs, threads, start).run(advanced)
 
 
 def contacts_of(runs: MotionBatch, which: Array, threads: int | None = None) -> Array:
-    """Name of the contact at which each motion loses contact or blows up, (m,); empty for other outcomes.
+    """Names (m,) of the contacts that lose contact or blow up in each motion; empty for other outcomes.
 
     The motions are simulated again, to their end.
     """
@@ -89,7 +90,7 @@ def contacts_of(runs: MotionBatch, which: Array, threads: int | None = None) -> 
 
 
 class _Course:
-    """Motions on their way to an outcome, simulated span by span.
+    """Motions that are simulated span by span until each has an outcome.
 
     Attributes
     ----------
@@ -121,7 +122,7 @@ class _Course:
         self.explicit = automatic_method(runs.rest.reduction) != STIFF
 
     def run(self, advanced: Callable[[int], None] | None) -> Array:
-        """Outcomes (m,), indices into `OUTCOMES`: simulates until every motion has one."""
+        """Simulate until every motion has an outcome; return the outcomes (m,) as indices into `OUTCOMES`."""
         if not self.started:
             self._return_at_once()
         open_ = np.flatnonzero(self.found == OPEN)
@@ -144,7 +145,7 @@ class _Course:
         return self.found
 
     def _return_at_once(self) -> None:
-        """Record the motions that begin in the neighbourhood of steady sliding."""
+        """Record the outcome "returns" for motions whose initial state lies in the neighbourhood of steady sliding."""
         which = np.arange(len(self.found))
         begun = advanced_runs(self.runs, which, None, AT_ONCE * self.span, False, self.threads)
         near = which[begun.status == CODE["done"]]
@@ -152,7 +153,10 @@ class _Course:
         self.found[near[self.runs.near.holds(near, begun.state[near])]] = RETURNS
 
     def _advanced(self, open_: Array) -> SpanResults:
-        """Simulate one span of some motions, grouped by method and by first span or later."""
+        """Simulate one span of the motions with indices `open_`.
+
+        They are grouped by integration method, and by whether the span is their first.
+        """
         fresh = ~self.begun[open_]
         found = SpanResults.empty(len(open_), self.state.shape[1], self.runs.rest.unknowns.shape[1])
         for stiff, anew in ((False, True), (False, False), (True, True), (True, False)):
@@ -168,9 +172,10 @@ class _Course:
         return found
 
     def _retried(self, open_: Array, ended: SpanResults) -> Array:
-        """Mark motions to be repeated by the implicit method, if the explicit one took too many steps; return the rest.
+        """Mark motions whose span must be repeated, and return indices of the others into `open_` after updating them.
 
-        If an implicit method took too many steps, the span ends where they were used up.
+        A span is repeated by the implicit method if the explicit method took too many steps. If the implicit method
+        took too many steps, the span ends where they were used up.
         """
         many = ended.status == CODE["too many steps"]
         again = many & ~self.stiff[open_] & self.explicit
@@ -187,7 +192,7 @@ class _Course:
         return over
 
     def _judge(self, which: Array, ended: SpanResults, watched: Array) -> None:
-        """Record the outcomes of motions `which` that are certain at the end of a span."""
+        """Record, for the motions with indices `which`, the outcomes that are certain at the end of a span."""
         runs, found, state = self.runs, self.found, self.state
         found[which] = _seen(runs, which, ended)
         running = np.flatnonzero(found[which] == OPEN)
@@ -219,7 +224,7 @@ class _Course:
         self.between[which] = apart
 
     def _goes_on(self, which: Array, tally: Array) -> Array:
-        """True (k,) for motions about unstable steady sliding that oscillate irregularly without growing."""
+        """True (k,) for motions `which` that oscillate irregularly about unstable steady sliding without growing."""
         rest = self.runs.rest.part(which)
         count, peak = (tally[:, TALLY.index(name)] for name in ("velocity_peaks", "peak_velocity"))
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -229,7 +234,7 @@ class _Course:
             return np.asarray(left & (count > PEAKS) & (now <= before + HIGHER * np.abs(before)))
 
     def _give_up(self, open_: Array) -> None:
-        """Record as undecided the motions that have used up their time or steps."""
+        """Record as undecided the motions that have used up their simulated time or their integration steps."""
         runs, open_ = self.runs, open_[self.found[open_] == OPEN]
         late = self.elapsed[open_] >= self.most[open_]
         unseen = runs.rest.stable[open_] & (runs.near.radius[open_] == 0)
@@ -240,18 +245,18 @@ class _Course:
 
 
 def _fates(runs: MotionBatch, threads: int | None, start: Array) -> Array:
-    """Outcomes of motions from given states."""
+    """Outcomes, as indices into `OUTCOMES`, of motions from the states `start` (arguments as `Shells` calls it)."""
     return outcomes_of(runs, threads, start=start)
 
 
 def _alike(now: Array, before: Array) -> Array:
-    """True where the time between slip events agrees with that at the end of the span before."""
+    """True where the time between slip events `now` agrees within `ALIKE` with that of the span `before`."""
     with np.errstate(invalid="ignore"):
         return np.asarray((now > 0) & (np.abs(now - before) < ALIKE * now))
 
 
 def _seen(runs: MotionBatch, which: Array, ended: SpanResults) -> Array:
-    """Outcomes that follow from the status of runs at the end of a span; OPEN where they can go on."""
+    """Outcomes (k,) that follow from the integrator's status at the end of a span; OPEN where the run can go on."""
     status = ended.status
     found = np.full(len(status), NO_SOLUTION)
     found[status == CODE["done"]] = OPEN
@@ -259,7 +264,7 @@ def _seen(runs: MotionBatch, which: Array, ended: SpanResults) -> Array:
     found[status == CODE["contact lost"]] = CONTACT_LOST
     many = status == CODE["too many steps"]
     limited = np.flatnonzero((status == CODE["stuck"]) | many)
-    if len(limited):  # either the integrator's limits, or no continuous solution
+    if len(limited):  # the integrator has reached a limit, or there is no continuous solution
         folded = at_fold(runs.rest.part(which[limited]), ended.state[limited], ended.unknowns[limited])
         lost = ~np.all(np.isfinite(ended.state[limited]), axis=1)
         further = np.where(many[limited], np.where(lost, EXHAUSTED, OPEN), STUCK)

@@ -70,7 +70,9 @@ def _nearest_oscillation(machine: Slider | Machine) -> str:
     built = [one for one in found if one.parameter.startswith(("links.", "drive."))]
     nearest = oscillatory_edge(built) or oscillatory_edge(found)
     if nearest is None:
-        raise NotAvailable("no parameter has an oscillatory edge in its range; name a parameter with --along NAME")
+        raise NotAvailable(
+            "no parameter has an oscillatory edge in its range, so none is chosen; name one with --along NAME"
+        )
     return nearest.parameter
 
 

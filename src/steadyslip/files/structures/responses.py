@@ -191,7 +191,8 @@ def _from_matlab(path: str, folder: Path) -> tuple[Array, dict[tuple[str, str], 
     except Exception as error:  # SciPy raises whatever a damaged file leads to
         raise UnreadableFile(
             path,
-            f"it has no frequency, response, points and unit as a MATLAB file up to version 7.2 ({error})",
+            "it cannot be read as a MATLAB file (up to version 7.2) with the variables frequency, response, points and "
+            f"unit ({error})",
         ) from error
     several = 4 - response.ndim
     response = np.reshape(response, (*response.shape, *(1,) * several))

@@ -17,14 +17,14 @@ from steadyslip.core.arrays import Array
 Equations = Callable[[Array], tuple[Array, Array]]
 """Function of u (n+1,): residuals (n,) and their Jacobian (n, n+1). May raise `Failure`."""
 MOST_ITERATIONS = 10  # limit of Newton iterations for one point
-ASIDE = 10.0  # factor on `reach` within which intermediate Newton iterates must stay
-NEARLY = 1e-5  # relative Newton step below which an increase of the next one is not divergence
-CHORDS = 8  # limit of iterations with an earlier Jacobian: where more are needed, a new one costs less time
+ASIDE = 10.0  # intermediate Newton iterates must stay within this many times `reach` of the guess
+NEARLY = 1e-5  # relative Newton step below which a larger next step is rounding and not divergence
+CHORDS = 8  # limit of iterations with an earlier Jacobian: beyond it, a new Jacobian takes less time
 GROW, FASTER, SHRINK = (
     1.4,
     2.0,
     0.4,
-)  # factors of the step after quick, straight and failed ones; chosen by trial
+)  # factors by which the step changes after a quick, a straight and a failed step; chosen by trial
 
 
 class Failure(ArithmeticError):
@@ -85,7 +85,7 @@ class SolutionCurve:
         return float(np.sqrt(np.sum(self.weights * u * u)))
 
     def start(self, guess: Array, tangent: Array) -> Point:
-        """Solution in the plane through `guess` normal to `tangent`, with its own tangent oriented as that."""
+        """Solution in the plane through `guess` normal to `tangent`; the tangent there is oriented as `tangent`."""
         return self.corrected(guess, tangent, 0.0)
 
     def corrected(self, guess: Array, tangent: Array, length: float, reach: float = np.inf) -> Point:
@@ -94,7 +94,7 @@ class SolutionCurve:
         Raises
         ------
         Failure
-            If it does not converge within `reach` of the guess: beyond, it would be on another curve.
+            If it does not converge within `reach` of the guess: a farther solution would be on another curve.
         """
         across = self.weights * tangent
         u, before = guess.copy(), np.inf
@@ -132,7 +132,7 @@ class SolutionCurve:
     def _approached(self, start: Array, moved: float, guess: Array, across: Array, reach: float) -> tuple[Array, float]:
         """Approximate solution by Broyden's method from the last Jacobian, and the size of its last step.
 
-        Returns `start`, and the size `moved` of the step that led to it, if that does not converge.
+        If the method does not converge, `start` is returned, and the size `moved` of the step that led to `start`.
         """
         if self.residuals is None or self.jacobian is None:
             return start, moved
@@ -158,7 +158,7 @@ class SolutionCurve:
     def follow(
         self, first: Point, step: float, least: float, most: float, accept: Callable[[Point], None] | None = None
     ) -> Iterator[Point]:
-        """Yield points along the curve from `first`, which is not among them.
+        """Yield points along the curve that begins at `first`; `first` itself is not yielded.
 
         A point continues the curve only if its tangent turns by no more than `most_turn` from that of the point before,
         and if it lies no farther from that tangent than an arc with this turn. It is predicted on the parabola through
@@ -207,7 +207,7 @@ class SolutionCurve:
         self, low: Point, high: Point, measure: Callable[[Point], float], at_low: float, at_high: float,
         width: float = 1e-11,
     ) -> tuple[Point, Point]:  # fmt: skip
-        """Bracket the zero of a function along the curve (Illinois method); the second point is the better one.
+        """Two points of the curve between which `measure` is zero (Illinois method); the second is closer to the zero.
 
         Raises
         ------
@@ -218,7 +218,7 @@ class SolutionCurve:
         near, far = low, high
         reach = 2 * self.bend * abs(b) + 100 * self.tolerance
         for _ in range(60):
-            rise = at_high - at_low  # 0 where `measure` is rounding at both ends
+            rise = at_high - at_low  # 0 where both values of `measure` are only rounding errors
             s = b - at_high * (b - a) / rise if rise else a
             if not a < s < b:
                 s = 0.5 * (a + b)

@@ -33,9 +33,9 @@ from steadyslip.protocol.inputs import inputs_at, segment_of
 from steadyslip.protocol.protocol import LOAD_POINT
 from steadyslip.protocol.segments import pack
 
-MOMENTS = 1000  # number of evenly spaced times of evaluation; those at jumps are added
-REFINED = 100  # number of times of evaluation between two neighbours with different verdicts
-DEPARTED = 2.0  # ratio of slip rate to the commanded one above which motion has departed, as for a slip event
+MOMENTS = 1000  # number of evenly spaced times at which stability is computed; the times of jumps are added
+REFINED = 100  # number of further times between two neighbouring times with different verdicts
+DEPARTED = 2.0  # ratio of slip rate to commanded slip rate above which motion has departed, as for a slip event
 ENDED = ("contact lost", "blow-up", "stuck", "no velocity")  # statuses that end both steady sliding and the motion
 
 
@@ -167,7 +167,7 @@ STABLE, UNSTABLE, ABSENT = "stable", "unstable", "no steady sliding"
 
 
 def _first_unstable(rates: Array, crossings: Sequence[tuple[float, str]]) -> float:
-    """Time (s) from which steady sliding is unstable first, 0 for the start; NaN where it never is."""
+    """Time (s) at which steady sliding becomes unstable for the first time; 0 for the start, NaN if never."""
     return 0.0 if rates[0] > 0 else next((time for time, verdict in crossings if verdict == UNSTABLE), np.nan)
 
 
@@ -296,7 +296,7 @@ class _Slow:
         return np.full(len(values["drive.velocity"]), np.nan)
 
     def _where_it_slides(self, quantity: Callable[..., Any], values: dict[str, Array]) -> Array:
-        """A quantity (n,) of the rig with changed parameters; NaN where velocity or a load is not positive."""
+        """Values (n,) of `quantity` for the rig with changed parameters; NaN where velocity or a load is not > 0."""
         sliding = np.logical_and.reduce([own > 0 for own in values.values()])
         found = np.full(len(sliding), np.nan)
         if np.any(sliding):
@@ -316,7 +316,7 @@ class _Slow:
 
 
 def _changes(rates: Array) -> Array:
-    """Indices of the growth rates (n,) whose verdict differs from that of the one before."""
+    """Indices of the growth rates (n,) whose verdict differs from the verdict at the index before."""
     verdicts = np.array([_verdict(one) for one in rates])
     return np.flatnonzero(verdicts[1:] != verdicts[:-1]) + 1
 
@@ -353,7 +353,7 @@ def _load_of(rig: Slider | Machine, contact: str) -> tuple[str, float]:
 
 
 def _departure(found: FrozenVerdicts, begun: float) -> float:
-    """First time (s) at which slip is `DEPARTED` times faster than commanded and than at time `begun` (s)."""
+    """First time (s) at which slip is `DEPARTED` times as fast as commanded and as it was at time `begun` (s)."""
     run = found.run
     commanded = run["load_velocity"] / run["load_velocity"][0]
     apart = np.zeros(len(run["t"]), dtype=bool)

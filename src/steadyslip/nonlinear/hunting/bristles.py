@@ -85,20 +85,20 @@ class BristleSteps(Bristles):
             self.clock[Held.LENGTH] = 1.0 / fastest if fastest else np.inf
 
     def step(self, piece: HeldPiece, state: Array, most: float) -> tuple[float, Array]:
-        """Length of a step within the error tolerance, at most `most` (s), and its dense output (5, width)."""
+        """Length (s) of a step within the error tolerance, at most `most`, and its dense output (5, width)."""
         self.begin(piece, state)
         self.clock[Held.STOP] = most
         found, _, _ = self._called(piece, state, ALLOWED)
         return float(self.clock[Held.STOP]), found
 
     def noise(self, piece: HeldPiece, rows: Array, coefficients: Array, length: float) -> Array:
-        """Errors of the first three coefficients of guards, (rows, 3): only of the value, 0 at a guard just passed."""
+        """Errors (rows, 3) of the first three polynomial coefficients of guards; only that of the value is not 0."""
         found = np.zeros((len(rows), 3))
         found[:, 0] = 1e-9 * np.abs(rows) @ np.abs(coefficients[0])
         return found
 
     def until(self, piece: HeldPiece, state: Array, coefficients: Array, length: float, share: float) -> Array:
-        """State (width,) at a share of a step, by a step of that length: dense output is of lower order."""
+        """State (width,) at a share of a step, by a new step of that length: dense output would be less accurate."""
         if share == 0:
             return state
         self.clock[Held.STOP] = share * length
@@ -109,11 +109,14 @@ class BristleSteps(Bristles):
         return self._called(piece, state, RATES)[1]
 
     def fastest(self, piece: HeldPiece, state: Array) -> float:
-        """Largest eigenvalue of the Jacobian at a state, absolute value, 1/s."""
+        """Largest absolute eigenvalue (1/s) of the Jacobian at a state."""
         return float(np.max(np.abs(np.linalg.eigvals(self._called(piece, state, RATES)[2]))))
 
     def _called(self, piece: HeldPiece, state: Array, way: int) -> tuple[Array, Array, Array]:
-        """Dense output (5, width) of a step from a state, and rates (width,) and Jacobian at the state."""
+        """Dense output (5, width) of one step, rates (width,) at its start, and the Jacobian there.
+
+        `way` says which of them are computed: one of `RATES`, `ALLOWED` and `FIXED`.
+        """
         width = len(state)
         found, rates, jacobian = np.zeros((5, width)), np.zeros(width), np.zeros((width, width))
         if self.code.bristle_step(
@@ -127,7 +130,10 @@ TOO_SHORT = "the motion of the bristles cannot be followed: steps become too sho
 
 
 def _inputs(piece: HeldPiece, contacts: Sequence[HeldContact]) -> Array:
-    """G, (inputs, width): slip rate of each contact, then memory (and normal stress with a load), or else drag."""
+    """Matrix G (inputs, width), which gives the inputs of the routine from the state Y.
+
+    The inputs of a contact are its slip rate, then its memory (and, with a load, its normal stress), or else its drag.
+    """
     plant, found = piece.plant, []
     place = 2 * plant.size + 4
     for one in contacts:
@@ -145,7 +151,7 @@ def _inputs(piece: HeldPiece, contacts: Sequence[HeldContact]) -> Array:
 
 
 def _outputs(plant: Plant, contacts: Sequence[HeldContact]) -> Array:
-    """H, (width, outputs): effect of friction force and memory rates of each contact on the rates of the state."""
+    """Matrix H (width, outputs), which gives rates of the state from friction forces and memory rates."""
     found, n, place, k = np.zeros((plant.width, plant.memory + len(contacts))), plant.size, 2 * plant.size + 4, 0
     for one in contacts:
         found[n : 2 * n, k] = -one.row / plant.inertia
@@ -170,7 +176,7 @@ def _tableau() -> Array:
 
 @dataclass(frozen=True)
 class _Kinds:
-    """Cache key of a routine: equal for laws of equal kinds, whatever their parameters."""
+    """Cache key of a compiled routine; it is equal for laws of equal kinds, whatever their parameters."""
 
     shapes: tuple[Any, ...]
     loaded: tuple[bool, ...]

@@ -28,19 +28,19 @@ from steadyslip.model.numeric import has_response
 from steadyslip.nonlinear.hunting.held_modes import HeldMode, HeldPiece
 from steadyslip.nonlinear.hunting.plant import Array, Plant, free_plant
 
-GROWS = 1e-6  # real part of a root over its size (sampled: size − 1) of growth; a double root at 0 has less by rounding
+GROWS = 1e-6  # a root grows if its real part over its size (sampled: size − 1) exceeds this; rounding is smaller
 NOTHING = 1e-12  # friction coefficient whose force is below rounding
 FACTOR, FACTORS = 2.0, 10  # gains and times are changed by this factor up to ten times: a thousandfold either way
-FROM_ZERO = 1 / 32  # first value tried for a derivative gain of zero, over proportional gain divided by root size
+FROM_ZERO = 1 / 32  # first value tried for a derivative gain of zero, as share of proportional gain over root size
 HALVINGS = 14  # bisections of the last factor, to four digits
-MOST_LATE = 50  # limit of samples in a dead time: the matrix of one sample grows with it
-NAMED = 3  # number of changes listed in the text, smallest first
+MOST_LATE = 50  # limit of samples in a dead time: the matrix of one sample grows with their number
+NAMED = 3  # number of changes of gains that the text lists, smallest first
 ALONE = "the controller is unstable without any friction: {what}; {remedy}"
 """Clause on a controller that is unstable without friction, for all texts and messages."""
 
 
 def unstable_by_itself(rig: Slider | Machine) -> str:
-    """Clause `ALONE` on a controller that is unstable without any friction; empty for a stable or missing one.
+    """Clause `ALONE` if the controller is unstable without any friction; empty if it is stable or there is none.
 
     Linear analysis: limits, dead band and encoder resolution are left out. For a sampled controller roots are those of
     the matrix of one sample.
@@ -77,7 +77,7 @@ def growing_root(rig: Slider | Machine) -> complex | None:
         If the roots cannot be computed.
     """
     with np.errstate(all="ignore"), warnings.catch_warnings():
-        for kind in (IllPosedWarning, UndecidedWarning):  # on roots that are NaN, which are ignored here
+        for kind in (IllPosedWarning, UndecidedWarning):  # warned of if roots are NaN, which are ignored here
             warnings.simplefilter("ignore", kind)
         if _has_matrices(rig):
             plant = free_plant(rig)
@@ -96,7 +96,7 @@ def without_friction(rig: Slider | Machine) -> Any:
 
 
 def _has_matrices(rig: Slider | Machine) -> bool:
-    """True unless the loop has a dead time without samples, a structure, or a coordinate without inertia."""
+    """True if the loop can be written as matrices: no dead time without sampling, no structure, all inertias > 0."""
     mechanism = rig.mechanism()
     late = any(one.delay for one in mechanism.elements) and not (mechanism.limits and mechanism.limits.sample_time)
     return not (late or mechanism.structures) and all(one.inertia for one in mechanism.coordinates)
@@ -187,7 +187,7 @@ def _moves(rig: Slider | Machine, root: complex) -> Iterator[_Move]:
 
 
 def _changes(rig: Slider | Machine, candidates: Iterable[tuple[_Move, ...]]) -> Iterator[tuple[float, str]]:
-    """Yield size (power of the factors) and text of joint changes that make the loop stable without friction."""
+    """Yield the joint changes that make the loop stable without friction: power of the factors, and text."""
     for moves in candidates:
         if len({one.name for one in moves}) == len(moves) and (power := _least_power(rig, moves)) is not None:
             yield power, " and ".join(_bound(rig, one, power) for one in moves)

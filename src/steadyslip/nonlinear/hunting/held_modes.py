@@ -17,7 +17,7 @@ from steadyslip.nonlinear.hunting.plant import Array, Load, Plant
 
 
 class Switch(NamedTuple):
-    """A change of mode: name of the field of `HeldMode` (singular), index of contact or load, and new position."""
+    """A change of mode: field of `HeldMode` (its name in the singular), index of contact or load, and new value."""
 
     name: str
     number: int
@@ -47,7 +47,7 @@ class HeldMode:
     limit: int = 0
 
     def switched(self, switch: Switch) -> HeldMode:
-        """The mode after a switch."""
+        """Copy of this mode after the change `switch`."""
         change: Any = {switch.name: switch.to}
         if switch.name in ("contact", "load"):
             every = f"{switch.name}s"
@@ -92,7 +92,7 @@ class HeldPiece:
 
     @cached_property
     def wanted(self) -> Array:
-        """Row of the controller's force before its limit."""
+        """Row that gives the controller's force without its limit."""
         plant = self.plant
         (gain, damping), *others = plant.gains
         of_all = plant.limits.dead_band is not None and not plant.limits.of_integral
@@ -107,7 +107,7 @@ class HeldPiece:
 
     @cached_property
     def force(self) -> Array:
-        """Row of the controller's force."""
+        """Row that gives the controller's force, limited if the mode is at the limit."""
         plant = self.plant
         if self.sampled:
             return plant.row(held=1.0)
@@ -117,7 +117,7 @@ class HeldPiece:
 
     @cached_property
     def pulls(self) -> tuple[tuple[Load, Array], ...]:
-        """Loads of all contacts in turn, each with the row of its force."""
+        """All loads, contact by contact, each with the row that gives its pull T."""
         loads = [load for contact in self.plant.contacts for load in contact.loads]
         return tuple((load, self.plant.passive(load) + load.controller * self.force) for load in loads)
 
@@ -132,17 +132,17 @@ class HeldPiece:
         return tuple(found)
 
     def normal(self, index: int) -> Array:
-        """Row of the normal stress of a contact."""
+        """Row that gives the normal stress of a contact."""
         plant = self.plant
         return sum((row for _, row in self.pressing[index]), plant.row(one=plant.contacts[index].normal))
 
     def rest(self, index: int) -> Array:
-        """Row of the largest friction force at rest of a contact."""
+        """Row that gives the largest friction force at rest of a contact."""
         own = self.plant.row(one=self.plant.contacts[index].rest)
         return sum((load.rest * row for load, row in self.pressing[index]), own)
 
     def drag(self, index: int) -> Array:
-        """Row of the viscous coefficient (friction force per slip rate) from loads of a sliding contact; 0 at rest."""
+        """Row that gives the viscous coefficient (friction force per slip rate) due to loads; 0 at rest."""
         if not self.mode.contacts[index]:
             return np.zeros(self.plant.width)
         return sum((load.drag * row for load, row in self.pressing[index]), np.zeros(self.plant.width))
@@ -153,7 +153,7 @@ class HeldPiece:
 
     @cached_property
     def pushed(self) -> Array:
-        """Rows (coordinates, width) of the accelerations without friction of contacts at rest."""
+        """Rows (coordinates, width) that give the accelerations if contacts at rest had no friction."""
         plant, n = self.plant, self.plant.size
         rows = np.zeros((n, plant.width))
         rows[:, :n], rows[:, n : 2 * n] = -plant.stiffness, -plant.damping
@@ -168,7 +168,7 @@ class HeldPiece:
 
     @cached_property
     def resting(self) -> dict[int, Array]:
-        """Rows of the friction forces of contacts at rest, by index of the contact."""
+        """Rows that give the friction forces of contacts at rest, by index of the contact."""
         plant = self.plant
         own = [i for i, (one, way) in enumerate(zip(plant.contacts, self.mode.contacts, strict=True))
                if not way and not one.slow]  # fmt: skip
@@ -208,7 +208,7 @@ class HeldPiece:
 
     @cached_property
     def guards(self) -> tuple[Array, tuple[Switch, ...]]:
-        """Rows (guards, width) whose values are not negative in this mode, and the switch of each."""
+        """Guards (guards, width): rows whose values are not negative in this mode; and the switch of each guard."""
         found = [*self._of_contacts(), *self._of_loads(), *(self._of_controller() if not self.sampled else ())]
         rows = np.array([row for row, _ in found]) if found else np.zeros((0, self.plant.width))
         return rows, tuple(switch for _, switch in found)
@@ -249,7 +249,7 @@ class HeldPiece:
 
 
 def _bounded(name: str, side: int, row: Array, bound: Array) -> list[tuple[Array, Switch]]:
-    """Guards and switches of a value (`row`) that is within ±`bound` (side 0), or beyond it at `side`."""
+    """Guards and switches for a quantity `row` with limits ±`bound`; `side` is 0 within them, else ±1 beyond them."""
     if side:
         return [(side * row - bound, Switch(name, 0, 0))]
     return [(bound - to * row, Switch(name, 0, to)) for to in (1, -1)]

@@ -25,16 +25,16 @@ from steadyslip.protocol.pieces import DisplacementStep
 from steadyslip.protocol.protocol import LOAD_POINT
 from steadyslip.protocol.segments import pack
 
-EXACT = 1e-9  # relative difference within which cycles solved exactly count as equal
-MOST_STROKES = 400  # limit of strokes, after which the decision is made from the last ones; chosen by trial
-SAMPLED_STROKES = 24  # as MOST_STROKES, for a sampled controller, whose strokes vary with the phase of sampling
-MOST_SAMPLED_STROKES = 100  # as SAMPLED_STROKES, while strokes shrink
+EXACT = 1e-9  # relative difference below which two cycles are equal, if the motion is solved exactly
+MOST_STROKES = 400  # limit of strokes; the decision is then made from the last strokes; chosen by trial
+SAMPLED_STROKES = 24  # MOST_STROKES for a sampled controller, whose strokes vary with the phase of sampling
+MOST_SAMPLED_STROKES = 100  # SAMPLED_STROKES while strokes still shrink
 IN_CORE = 2_000_000  # limit of steps of the compiled core: some ten seconds
 MOST_STEPS = 50_000  # limit of steps outside the compiled core, at switches of the mode
-OFTEN = 0.02  # share of new strokes after which repetition is tested again: a ringing drive makes thousands
+OFTEN = 0.02  # repetition is tested again after this share of new strokes: a ringing drive makes thousands
 LONGEST = 1e9  # default end, s; the motion ends earlier by rest, repetition or the limits above
 CYCLES = 8  # largest number of strokes in a cycle that is looked for; usually it has two
-SHRINKING = 0.9  # ratio of later to earlier strokes below which they shrink; chosen by trial
+SHRINKING = 0.9  # strokes shrink if the ratio of later to earlier strokes is below this; chosen by trial
 
 
 @checked(until=DURATION)
@@ -124,7 +124,7 @@ def hunt(
 
 
 def _enough(strokes: Sequence[Stroke], sampled: bool) -> bool:
-    """True if the limit of strokes is reached, after which the decision is made from those there are."""
+    """True if the limit of strokes is reached, so that the decision must be made from `strokes`."""
     if not sampled:
         return len(strokes) >= MOST_STROKES
     goes_on = len(strokes) >= SAMPLED_STROKES and _trend(strokes) is True
@@ -132,7 +132,7 @@ def _enough(strokes: Sequence[Stroke], sampled: bool) -> bool:
 
 
 def _target(protocol: Protocol) -> Protocol:
-    """The protocol; raises ParameterError unless it acts on the target alone, without waves."""
+    """The protocol itself; raises ParameterError unless it only moves the target, without waves."""
     problems = []
     for number, piece in enumerate(protocol.pieces, start=1):
         if piece.channel != LOAD_POINT or piece.frees_load_point or piece.wave() is not None:
@@ -161,7 +161,7 @@ def _usual_step(plant: Plant, unit: str) -> float:
             f"\"displacement-step at=0s by='1 {unit}'\""
         )
         raise ParameterError([Problem("protocol", message)])
-    return float(f"{step:.6g}")  # rounded for display: the exact size does not matter
+    return float(f"{step:.6g}")  # rounded for display: the exact size of the step does not matter
 
 
 def cycle_length(strokes: Sequence[Stroke], close: float) -> int:
@@ -224,7 +224,7 @@ def _result(
 def _recent(strokes: Sequence[Stroke], count: int, shrinks: bool) -> Sequence[Stroke]:
     """Strokes that the result reports: the last two if they shrink, the last cycle of `count`, or the last third.
 
-    The very last stroke is left out if there are others: the motion ended before its bristles and springs relaxed.
+    The last stroke is left out if there are others: the motion ended before bristles and springs had relaxed.
     """
     if shrinks or len(strokes) < 3:
         return strokes[-2:]
@@ -246,8 +246,8 @@ def _at_reported_body(stroke: Stroke, ratio: float) -> Stroke:
 def _trend(strokes: Sequence[Stroke]) -> bool | None:
     """True if later strokes reach as far as earlier ones, False if they shrink to zero, None if undecided.
 
-    Undecided are fewer than six strokes, and strokes that shrink towards a finite size, as before a cycle: the limit is
-    extrapolated by Aitken's method.
+    The trend is undecided with fewer than six strokes, and if strokes shrink towards a finite size, as before a cycle;
+    that size is extrapolated by Aitken's method.
     """
     if len(strokes) < 6:
         return None

@@ -23,8 +23,8 @@ from steadyslip.nonlinear.hunting.plant import Array
 from steadyslip.nonlinear.hunting.stick_and_slip import STILL, Stroke, swings
 from steadyslip.protocol import Protocol
 
-SYMMETRIC = 1e-3  # relative difference of both sides below which one ± is printed: numbers have four digits
-SETTLED_DIGITS = 3  # of times until rest: an axis creeps there, so that rounding moves the time by 2e-3
+SYMMETRIC = 1e-3  # relative difference of both sides below which one number with ± is printed: numbers have four digits
+SETTLED_DIGITS = 3  # digits of the time until rest: the axis creeps to rest, so that rounding changes this time by 2e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +37,12 @@ class Hunt(ReadOnly):
     protocol : Protocol
         Motion of the target.
     hunts : bool or None
-        True if strokes go on without becoming smaller, False if the axis settles; None if the motion ended before.
+        True if strokes go on without becoming smaller, False if the axis settles; None if neither was seen.
     runs_away : bool
         True if the error grows without limit: the controller is unstable in sliding, or too weak for a load.
     lowest, highest : float
-        Extremes of measured position minus target (m or rad), in the last cycle, or since the last rest; for a machine
-        those of the drive, or of the body whose feed is given (`velocity_of`), converted as in steady motion.
+        Extremes of measured position minus target (m or rad), in the last cycle, or since the last rest. For a machine
+        they are of the drive, or of the body whose feed is given (`velocity_of`), converted as in steady motion.
     period : float
         Duration of the cycle (s), of strokes both ways; NaN if strokes do not repeat.
     repeats : bool
@@ -136,7 +136,7 @@ class Hunt(ReadOnly):
 
     @property
     def approached_at(self) -> float:
-        """Time (s) from which an axis that ends on its target is as close to it as in its last strokes.
+        """Time (s) from which on an axis that ends on its target is as close to the target as in its last strokes.
 
         Infinite if the axis does not end on its target within numerical errors.
         """
@@ -148,16 +148,16 @@ class Hunt(ReadOnly):
 
     @property
     def at_body(self) -> str:
-        """Name of the body of `error`, as " at motor"; empty for a rig with one body."""
+        """Name of the body whose error is `error`, such as " at motor"; empty for a rig with one body."""
         return f" at {name}" if (name := reported_body(self.rig)) else ""
 
     @property
     def force_label(self) -> str:
-        """Name of `force`, which is a torque where the drive turns."""
+        """Label of `force`: "force", or "torque" where the drive turns."""
         return "torque of the drive" if self.rig.drive.turns else "force of the drive"
 
     def _sizes(self, both: bool) -> str:
-        """Format the distances of all bodies from their targets, with names: on `both` sides, or the larger one."""
+        """Text of the distances of all bodies from their targets: on `both` sides, or the larger distance."""
         own = self._size(self.lowest, self.highest, self.unit, both)
         if not (name := reported_body(self.rig)):
             return own
@@ -169,7 +169,7 @@ class Hunt(ReadOnly):
 
     @property
     def _beside(self) -> str:
-        """Format the bodies that rest off their targets while the reported one is on its own; empty without any."""
+        """Text on bodies that rest off their targets while the reported body is on target; empty if there are none."""
         ratios, way = other_bodies(self.rig), float(np.max(np.abs(self.error), initial=0.0)) / self.rig.feed()[0]
         off = [
             f"{self._size(one.lowest, one.highest, one.unit, False)} off it at {one.body}" for one in self.others
@@ -178,7 +178,7 @@ class Hunt(ReadOnly):
         return f"{self.at_body} ({', '.join(off)})" if off else ""
 
     def _size(self, low: float, high: float, unit: str, both: bool) -> str:
-        """Format a range about the target: one ± if both sides agree in the printed digits or within `scatter`."""
+        """Text of a range about the target: one number with ± if both sides agree as printed or within `scatter`."""
         far = max(abs(low), abs(high))
         if not both:
             return format_quantity(far, unit)
@@ -189,12 +189,12 @@ class Hunt(ReadOnly):
 
     @cached_property
     def unstable_loop(self) -> str:
-        """Clause on a controller that is unstable without any friction, with remedies; empty for a stable one."""
+        """Clause on a controller that is unstable without any friction, with remedies; empty if it is stable."""
         return unstable_by_itself(self.rig)
 
     @property
     def _encoder(self) -> str:
-        """Format the step of an encoder at another body than the drive's, there and at the drive; empty for others."""
+        """Text of the encoder's step, at its body and at the drive; empty if the encoder is at the drive."""
         drive: Any = self.rig.drive
         ratio = self.rig.seen()[0]
         step = getattr(drive, "resolution", None)
@@ -218,7 +218,7 @@ class Hunt(ReadOnly):
 
     @property
     def _of_late(self) -> str:
-        """Format the range of positions in the last third of the motion; empty if it is one position."""
+        """Text of the range of positions in the last third of the motion; empty if the position is constant."""
         places = -self.error[self.time >= self._end * 2 / 3]
         low, high = (format_quantity(float(end(places)), self.unit) for end in (np.min, np.max))
         return "" if low == high else f"; in the last third of this time from {low} to {high} of it"

@@ -15,8 +15,8 @@ from steadyslip.nonlinear.hunting.plant import Array, Plant
 from steadyslip.nonlinear.hunting.steps import passage
 
 AT_ONCE = 4096  # steps of one call of the core: some ten milliseconds
-NONE = np.zeros((0, 2)), np.zeros((0, 0, 0))  # lengths and passages of a piece that has none yet
-FEW = 0.25  # phase of the fastest mode between two recorded values, rad
+NONE = np.zeros((0, 2)), np.zeros((0, 0, 0))  # step lengths and passage matrices of a new piece: none
+FEW = 0.25  # largest phase (rad) of the fastest mode between two recorded values
 
 
 class CompiledMotion:
@@ -53,7 +53,7 @@ class CompiledMotion:
 
     @property
     def period(self) -> float:
-        """Sample time (s); 0 of a controller without samples."""
+        """Sample time (s) of the controller; 0 if it is not sampled."""
         return float(self.control[Control.PERIOD])
 
     @property
@@ -105,7 +105,7 @@ class CompiledMotion:
         return turn == Turn.STEP, rows[: int(clock[Held.ROWS])]
 
     def _every(self, piece: HeldPiece) -> int:
-        """Number of nodes of a step between two recorded values; all, if a constant force needs only the ends."""
+        """Number of nodes of a step between two recorded values; the whole step where its ends are enough."""
         if self.clock[Held.RESTS]:
             return NODES - 1
         if not (piece.linear and self.period):

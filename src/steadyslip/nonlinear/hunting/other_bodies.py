@@ -16,7 +16,9 @@ from steadyslip.nonlinear.hunting.plant import Array, Plant
 
 @dataclass(frozen=True)
 class BodySwing(Displayed):
-    """Extremes of position minus target of a body with friction; its target is that of the drive, as in steady motion.
+    """Extremes of position minus target of a body with friction.
+
+    The body's target is the drive's target, converted as in steady motion.
 
     Attributes
     ----------
@@ -45,7 +47,10 @@ def measured_body(rig: Rig) -> str:
 
 
 def other_bodies(rig: Rig) -> dict[str, float]:
-    """Bodies with contacts, with their motion per motion of the drive; without a reported body that is measured."""
+    """Bodies with contacts, by name, with their motion per motion of the drive; without the reported body.
+
+    If the reported body is not the one that the controller measures, it is included.
+    """
     own = reported_body(rig)
     if not own:
         return {}

@@ -1,7 +1,8 @@
-"""Matrices of a rig whose drive holds a position: inertia, springs, controller and contacts, as numbers.
+"""Numeric matrices of a rig whose drive holds a position: inertia, springs, controller and contacts.
 
 The state is Y = [q, w, I, r, r', u, z, 1]: positions and velocities of the coordinates, integral of the error, target
-and its velocity, force of a sampled controller, memory of the contacts, 1. A row (width,) gives a quantity as row·Y.
+and its velocity, force of a sampled controller, memory of the contacts, and the constant 1. A row is an array (width,)
+that gives a quantity as the product row·Y.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """Pull T that adds to a contact's preload: normal stress grows by `forward` T for T > 0, by −`back` T for T < 0.
+    """A pull T that adds to the normal stress of a contact: `forward` T if T > 0, −`back` T if T < 0.
 
     Attributes
     ----------
@@ -37,8 +38,8 @@ class Load:
     forward, back : float
         Normal stress per T for T > 0, and per −T for T < 0.
     rest, coulomb, drag : float
-        Largest friction force at rest, and in sliding its constant part and that per slip rate, per normal stress; 0
-        for a law with memory.
+        Largest friction force at rest, constant part of sliding friction, and sliding friction per slip rate; all per
+        normal stress, and 0 for a law with memory.
     """
 
     places: Array
@@ -53,7 +54,9 @@ class Load:
 
 @dataclass(frozen=True, eq=False)
 class HeldContact:
-    """A contact: forces −`row` F with F = `coulomb` sign(v) + `drag` v and v = `row`·w − `belt` r', without loads.
+    """A contact whose friction F acts on the coordinates with the forces −`row` F.
+
+    Without loads F = `coulomb` sign(v) + `drag` v, where the slip rate is v = `row`·w − `belt` r'.
 
     Attributes
     ----------
@@ -70,7 +73,7 @@ class HeldContact:
     normal : float
         Normal stress (Pa), or force, without its loads.
     slow : float
-        Slip rate (m/s) below which a contact with memory counts as at rest; 0 for one without.
+        Slip rate (m/s) below which a contact with memory counts as at rest; 0 for a contact without memory.
     loads : tuple of Load
     """
 
@@ -92,7 +95,7 @@ class HeldContact:
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """A rig at rest as matrices; `size` is the number of coordinates, `memory` that of memory variables."""
+    """Matrices of a rig at rest; `size` is the number of coordinates, `memory` the number of memory variables."""
 
     inertia: Array
     stiffness: Array
@@ -130,7 +133,9 @@ class Plant:
         )
 
     def row(self, place: Array | None = None, velocity: Array | None = None, **others: float) -> Array:
-        """Row (width,) of its parts; `others` are ``integral``, ``target``, ``target_velocity``, ``held``, ``one``."""
+        """Row (width,) made of the given coefficients of positions (`place`) and velocities; the rest is 0.
+
+        `others` are coefficients named ``integral``, ``target``, ``target_velocity``, ``held`` and ``one``."""
         n = self.size
         found = np.zeros(self.width)
         if place is not None:
@@ -143,23 +148,23 @@ class Plant:
         return found
 
     def error(self, loop: int = 0) -> Array:
-        """Row of the error of one loop of the controller.
+        """Row that gives the error of one loop of the controller; for a speed loop, the integral of its error.
 
-        For a speed loop that is the integral of its error, without the target if derivatives are of the measurement.
+        The target is left out if the speed loop takes derivatives of the measurement only.
         """
         kicked = loop == 0 or not self.limits.on_measurement
         return self.row(-self.places[loop], target=1.0 if kicked else 0.0)
 
     def error_rate(self, loop: int = 0) -> Array:
-        """Row of the derivative of `error`, or of the measured position alone with `limits.on_measurement`."""
+        """Row that gives the time derivative of `error`, or with `limits.on_measurement` of the measured position."""
         return self.row(None, -self.places[loop], target_velocity=0.0 if self.limits.on_measurement else 1.0)
 
     def passive(self, load: Load) -> Array:
-        """Row of a load without the controller's share in it."""
+        """Row that gives the pull T of a load without the part that the controller's force adds."""
         return self.row(load.places[:-1], load.speeds[:-1], target=load.places[-1], target_velocity=load.speeds[-1])
 
     def slip(self, contact: HeldContact) -> Array:
-        """Row of the slip rate of a contact."""
+        """Row that gives the slip rate of a contact."""
         return self.row(None, contact.row, target_velocity=-contact.belt)
 
 
@@ -212,7 +217,7 @@ def free_plant(rig: Slider | Machine) -> Plant:
 
 
 def _row(shares: Mapping[str, Any], names: list[str], target: bool = False) -> Array:
-    """Shares as array over the coordinates, with that of the load point as last element if `target`."""
+    """Convert shares by name to an array over the coordinates; with `target` the load point's share is appended."""
     found = [float(shares.get(name, 0)) for name in names]
     return np.array([*found, float(shares.get(LOAD_POINT, 0))] if target else found)
 
@@ -293,7 +298,9 @@ def _load(mechanism: Mechanism, port: ContactPort, shares: tuple[float, float], 
 
 
 def _merged(contacts: list[HeldContact]) -> tuple[HeldContact, ...]:
-    """Contacts, with those joined that have no memory and proportional slip rates: at rest only their sum is known."""
+    """The contacts, where contacts without memory whose slip rates are proportional are joined to a single contact.
+
+    At rest, only the sum of the friction forces of joined contacts is known."""
     found: list[HeldContact] = []
     for one in contacts:
         for i, other in enumerate(found):
@@ -317,7 +324,7 @@ def _merged(contacts: list[HeldContact]) -> tuple[HeldContact, ...]:
 
 
 def _check_forces_at_rest(plant: Plant) -> None:
-    """Raise NotAvailable if a contact at rest would have to balance nonlinear friction of another."""
+    """Raise NotAvailable if friction at a resting contact would have to balance nonlinear friction elsewhere."""
     for one, other in itertools.permutations(plant.contacts, 2):
         if not one.slow and other.curved and one.row @ (other.row / plant.inertia):
             at_rest, moves = (f"contacts.{contact.port.name}" for contact in (one, other))

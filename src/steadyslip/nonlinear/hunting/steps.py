@@ -1,4 +1,4 @@
-"""Steps of a linear piece as polynomials in the fraction of the step, and the first guard that becomes negative.
+"""Steps of a linear piece as polynomials in the fraction of the step, and the guard that first becomes negative.
 
 Without memory a mode is a linear system, and a step is the Taylor series of the exact solution, to rounding.
 """
@@ -12,7 +12,7 @@ from steadyslip.nonlinear.hunting.held_modes import HeldPiece
 from steadyslip.nonlinear.hunting.plant import Array
 
 DEGREE = 22  # degree of the Taylor series: 1/22! is 1e-21, and steps are at most one over the largest eigenvalue
-ROUNDING = 1e-13  # relative error of the first coefficients of a guard: some hundred roundings
+ROUNDING = 1e-13  # assumed relative error of the first coefficients of a guard: some hundred rounding errors
 NODES = np.linspace(0.0, 1.0, holding.NODES)  # fractions of a step at which guards are evaluated
 POWERS = NODES ** np.arange(DEGREE + 1)[:, None]
 
@@ -26,7 +26,9 @@ def series(piece: HeldPiece, length: float) -> Array:
 
 
 class ExactSteps:
-    """Steps of the exact solution Y(t + s h) = Σ c_k s^k of linear pieces, h at most one over the fastest rate."""
+    """Steps of the exact solution Y(t + s h) = Σ c_k s^k of linear pieces.
+
+    The step length h is at most one over the largest eigenvalue."""
 
     def __init__(self) -> None:
         self._series: dict[HeldPiece, tuple[float, Array]] = {}
@@ -78,7 +80,8 @@ def passage(piece: HeldPiece, watched: Array, length: float) -> Array:
     Returns
     -------
     ndarray (rows, width)
-        Times the state at the start: the state at the end, coefficients of each guard in turn, values of `watched`.
+        Multiplied by the state at the start it gives the state at the end, then the coefficients of each guard in turn,
+        then the values of `watched`.
     """
     rows, _ = piece.guards
     width, powers = len(piece.matrix), series(piece, length)
@@ -109,7 +112,7 @@ def first_crossing(guards: Array, fresh: Array, noise: Array) -> tuple[float, in
 
 
 def _root(guard: Array) -> float | None:
-    """First share of a step at which a guard becomes negative that was not at its start; None if there is none."""
+    """Share of a step at which a guard, not negative at the start, first becomes negative; None if it does not."""
     from scipy.optimize import brentq, minimize_scalar  # not at start-up
 
     values = guard @ POWERS[: len(guard)]

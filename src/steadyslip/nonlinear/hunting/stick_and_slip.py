@@ -16,21 +16,21 @@ from steadyslip.nonlinear.hunting.plant import Array, HeldContact, Plant
 from steadyslip.nonlinear.hunting.steps import NODES, POWERS, ExactSteps, first_crossing
 from steadyslip.protocol.segments import Segments
 
-BEYOND = 1e-12  # relative excess of a force over friction at rest that is rounding
-STILL_ERROR = 0.1  # factor on rtol: relative speeds of bristles below it are noise (by trial)
-STILL = 1e-9  # speed over the fastest so far, below which a body counts as at rest
-AT_ONCE = 100  # limit of switches without time passing; more do not come to an end
-AWAY = 1e4  # error over that which friction, load or target explain, beyond which friction is negligible
+BEYOND = 1e-12  # relative excess of a force over static friction that counts as rounding
+STILL_ERROR = 0.1  # factor on rtol: smaller relative speeds of bristles are numerical noise (by trial)
+STILL = 1e-9  # a body counts as at rest below this share of the largest speed so far
+AT_ONCE = 100  # limit of successive switches at one time; more switches would never end
+AWAY = 1e4  # ratio of the error to that which friction, load or target explain, above which friction is negligible
 KEPT = slice(0, None, 8)  # nodes of a step at which values are recorded
 
 
-LEAST_LOAD = 1e-13  # share of the largest load below which its sign is ignored: rounding of the friction it causes
-RINGING = 0.1  # share of the longest stroke of the later half below which a stroke is ringing, as for slip events
+LEAST_LOAD = 1e-13  # share of the largest load below which a load's sign is ignored: its friction is within rounding
+RINGING = 0.1  # a stroke shorter than this share of the longest one in the later half is ringing, as for slip events
 
 
 @dataclass
 class Stroke:
-    """Motion between two rests: start and end (s), errors there (m or rad), and extremes of error and speed."""
+    """Motion between two rests: times (s) of start and end, errors then (m or rad), extremes of error and speed."""
 
     start: float
     begins: float
@@ -42,7 +42,9 @@ class Stroke:
 
 
 def swings(strokes: Iterable[Stroke]) -> list[Stroke]:
-    """Complete strokes in alternating directions: those in one direction joined, those below `RINGING` omitted.
+    """Complete strokes in alternating directions.
+
+    Successive strokes in one direction are joined, and strokes shorter than `RINGING` allows are left out.
 
     A ringing drive rests for moments on its way, and its bristles spring back a little.
     """
@@ -65,7 +67,7 @@ def swings(strokes: Iterable[Stroke]) -> list[Stroke]:
 
 @dataclass
 class Trace:
-    """Recorded rows of a motion (time, error, velocity of the measured position, controller force, others); strokes."""
+    """Record of a motion: its strokes, and rows of time, error, measured velocity, controller force, further values."""
 
     rows: list[Array] = field(default_factory=list)
     strokes: list[Stroke] = field(default_factory=list)
@@ -135,14 +137,14 @@ class Motion:
                 yield from self._to(float(end))
 
     def table(self) -> Array:
-        """Time, error, velocity of the measured position, force and further values so far, (times, 4 or more)."""
+        """Recorded values so far (times, 4 or more): time, error, measured velocity, force and further values."""
         self.watched[2] = self._piece().force
         now = np.array([[self.time, *(self.watched @ self.state)]])
         kept = [*self.trace.rows, *([now] if self.time > 0 else [])]
         return np.concatenate(kept) if kept else np.zeros((0, 1 + len(self.watched)))
 
     def _to(self, end: float) -> Iterator[Stroke | None]:
-        """Advance towards `end` (s): in the compiled core until the mode may change, then by a step or to a sample."""
+        """Advance towards `end` (s): by the compiled core until the mode may change, then by a step or to a sample."""
         piece = self._piece()
         if self.sampled or not piece.linear or (piece.fastest > 0 and not self.fresh):
             end = self._follow(end)
@@ -153,7 +155,7 @@ class Motion:
                 break
 
     def _follow(self, end: float) -> float:
-        """Advance in this mode by the compiled core; returns the time (s) up to which steps are needed, if any."""
+        """Advance in this mode by the compiled core; returns the time (s) up to which single steps are needed."""
         clock, strokes = self.core.clock, self.trace.strokes
         last = strokes[-1] if strokes else Stroke(0.0, 0.0)
         rests = self.sampled and not any(self.mode.contacts)
@@ -187,7 +189,7 @@ class Motion:
         return self._exact_steps if self._piece().linear else self._bristle_steps
 
     def _step(self, end: float) -> Stroke | None:
-        """Take one step, at most to a switch or the `end` (s); returns the stroke that it completes, or None."""
+        """Take one step, at most to the next switch or to `end` (s); returns the stroke that it completes, or None."""
         piece, stepper = self._piece(), self._stepper
         length, coefficients = stepper.step(piece, self.state, end - self.time)
         self.steps += 1
@@ -199,7 +201,7 @@ class Motion:
             one.name == "contact" and bool(self.mode.contacts[one.number]) and not self.plant.contacts[one.number].slow
             for one in switches
         ]
-        noise[np.array(begun, dtype=bool) & fresh, 0] = np.inf  # a slip rate that is 0 apart from rounding
+        noise[np.array(begun, dtype=bool) & fresh, 0] = np.inf  # a slip rate that is 0 except for rounding
         crossed = first_crossing(guards, fresh, noise) if len(rows) else None
         share = 1.0 if crossed is None else crossed[0]
         if share > 0:
@@ -225,7 +227,7 @@ class Motion:
     # -- switches
 
     def _switched(self, switch: Switch) -> Stroke | None:
-        """Change the mode; returns the stroke that ends by it, or None."""
+        """Change the mode by a switch; returns the stroke that ends thereby, or None."""
         moved = any(self.mode.contacts)
         self.fresh |= {(switch.name, switch.number)}
         self.mode = self.mode.switched(switch)
@@ -235,14 +237,14 @@ class Motion:
         return self._stroke(moved)
 
     def _stop(self, index: int) -> None:
-        """Set the slip rate of a contact to exactly 0, by the least change of momentum."""
+        """Set the slip rate of a contact to exactly 0 by the smallest possible change of momentum."""
         contact, n = self.plant.contacts[index], self.plant.size
         slip = float(self.plant.slip(contact) @ self.state)
         share = contact.row / self.plant.inertia
         self.state[n : 2 * n] -= share * (slip / float(contact.row @ share))
 
     def _settle_contacts(self) -> None:
-        """Switch contacts to sliding that would need more friction than the largest at rest."""
+        """Switch those contacts to sliding that would need more than the largest static friction to stay at rest."""
         for _ in self.plant.contacts:
             piece = self._piece()
             forces = {i: float(row @ self.state) for i, row in piece.resting.items()}
@@ -308,18 +310,18 @@ class Motion:
 
     @property
     def _far(self) -> float:
-        """Error (m or rad) beyond which its growth has no end; infinite if no friction, load or target sets a scale."""
+        """Error (m or rad) above which it grows for ever; infinite if no friction, load or target sets a scale."""
         far = AWAY * max(self.expected, abs(float(self.state[2 * self.plant.size + 1])))
         return far or np.inf
 
     @property
     def _pace(self) -> float:
-        """Scale of speed (m/s or rad/s): the fastest so far, or that of bristles."""
+        """Scale of speed (m/s or rad/s): the largest speed so far, or the speed scale of bristles."""
         return max([self.fastest, *(one.slow for one in self.plant.contacts)])
 
     @property
     def runs_away(self) -> bool:
-        """True if the error has become so large that its growth has no end."""
+        """True if the error has become so large that it will grow for ever."""
         return self._far < self.farthest
 
     @property
@@ -362,7 +364,7 @@ def _least(values: Array) -> float:
 
 
 def _excess(force: float, most: float) -> float:
-    """Relative excess of a force over the largest friction at rest; infinite where there is no friction."""
+    """Relative excess of a force over the largest static friction `most`; infinite where that is 0."""
     return force / most - 1.0 if most > 0 else (np.inf if force > 0 else -1.0)
 
 
@@ -412,5 +414,5 @@ def friction_at_rest(contact: HeldContact, pull: float) -> float:
     """Largest friction force at rest (N, or Pa) with loads of a size `pull`; with bristles that of slow sliding."""
     if not contact.slow:
         return contact.rest + pull * float(sum(one.rest * max(one.forward, one.back) for one in contact.loads))
-    slow = contact.slow * 1e-6  # far below the velocity from which on friction depends on it
+    slow = contact.slow * 1e-6  # far below the velocity above which friction depends on velocity
     return float(contact.port.area * contact.port.friction.steady_strength(slow, largest_normal(contact, pull)))

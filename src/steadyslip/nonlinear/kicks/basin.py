@@ -40,7 +40,7 @@ from steadyslip.nonlinear.kicks.spans import (
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.follow import cycles
 
-POINTS = 81  # default number of points along each axis: an edge is located to 1.2 % of the picture
+POINTS = 81  # default number of grid points along each axis: the edge of the basin is located to 1.2 % of the axis
 STEPS = 2e9  # limit of integration steps for all motions of a basin
 
 
@@ -69,7 +69,7 @@ class Basin(ReadOnly):
     steady : tuple of float
         Steady sliding in the plane, SI units.
     contact : ndarray of str (m, n)
-        Of a machine: the contact that is lost, or fastest in a blow-up; else empty.
+        For a machine, the contact that is lost, or that is the fastest in a blow-up; else empty.
     """
 
     rig: Slider | Machine
@@ -89,7 +89,7 @@ class Basin(ReadOnly):
 
     @property
     def share(self) -> float:
-        """Fraction of the grid's points whose motion returns."""
+        """Fraction of the grid points from which the motion returns to steady sliding."""
         return float(np.mean(self.outcome == "returns"))
 
     @property
@@ -217,7 +217,7 @@ class _Plane:
 
 
 def _plane_of(rig: Slider | Machine, rest: Rest, at: str | None) -> _Plane:
-    """Phase plane of a slider's block, or of one body of a machine: unless named, that whose contact moves most."""
+    """Phase plane of a slider's block, or of the body `at` of a machine; by default that whose contact moves most."""
     if isinstance(rig, Slider):
         drive = rig.drive.velocity
         heights = drive * np.geomspace(1e-4, 1e4, POINTS)
@@ -251,7 +251,7 @@ def _plane_of(rig: Slider | Machine, rest: Rest, at: str | None) -> _Plane:
 
 
 def _unstable_cycles(rig: Slider | Machine, along: str, branch: int, progress: bool | None) -> tuple[History, ...]:
-    """One period of each unstable cycle at the rig's own parameter; empty where no branch can be followed."""
+    """One period of each unstable cycle of the rig as it is; empty where no branch of cycles can be followed."""
     with progress_text("following cycles", progress) as show:
 
         def report(count: int, _: Cycle) -> None:

@@ -30,7 +30,7 @@ from steadyslip.nonlinear.kicks.spans import (
 from steadyslip.nonlinear.kicks.threshold import edges
 from steadyslip.protocol import Protocol
 
-COARSE = 48  # number of sizes in the first scan of each rig
+COARSE = 48  # number of kick sizes in the first scan of each rig
 WIDE = 0.1  # relative width of an undecided bracket above which the threshold is NaN, not its middle
 BEYOND = (*OUTCOMES[:UNDECIDED], *(f"undecided: {doubt}" for doubt in DOUBTS), "edge", "unstable", "no steady sliding",
           "out of range")  # fmt: skip
@@ -51,7 +51,7 @@ class Brackets:
     beyond : ndarray of int
         Limit, an index into `BEYOND`.
     contact : ndarray of str
-        Of machines: the contact that is lost beyond, or fastest in a blow-up; else empty.
+        For machines: the contact that is lost after a larger kick, or fastest in a blow-up; else empty.
     """
 
     size: Array
@@ -199,7 +199,7 @@ class _Search:
         edge = np.full(len(self.low), np.inf)
         edge[alive] = edges(kicked, self.rig[alive], sizes)
         going = alive
-        for size in sizes:  # rising sizes, for the rigs in which no smaller one has failed
+        for size in sizes:  # rising sizes, each for the rigs in which no smaller kick has failed
             over = size >= edge[going]
             self.high[going[over]], self.beyond[going[over]] = edge[going[over]], EDGE
             going = going[~over]
@@ -215,7 +215,10 @@ class _Search:
             self._tried(wide, point)
 
     def _next(self, precision: float) -> tuple[Array, Array]:
-        """Next sizes and indices of the rigs with too wide brackets: the middle, or values near undecided sizes."""
+        """Indices of the rigs whose brackets are too wide, and the next sizes to simulate for them.
+
+        A size is the middle of the bracket, or a value near undecided sizes.
+        """
         low, high, (left, right) = self.low, self.high, self.doubt.T
         with np.errstate(invalid="ignore"):
             clear = np.isnan(left)

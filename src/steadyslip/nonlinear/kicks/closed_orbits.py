@@ -22,21 +22,21 @@ from steadyslip.nonlinear.kicks.spans import MotionBatch, advanced_runs, constan
 from steadyslip.nonlinear.orbits.cycle_from_motion import cycle_near
 from steadyslip.nonlinear.orbits.flow import FlowRunner
 
-BESIDE = 1e-4  # step of finite differences, natural sizes
-MOST_COMPILED = 18  # variables, times contacts, of structures: 15 take 3 CPU s, 12 with two contacts 5
+BESIDE = 1e-4  # step of finite differences, in natural sizes
+MOST_COMPILED = 18  # largest number of variables times contacts of a rig with structures: 15 take 3 CPU s to compile
 ROUNDS = 8  # limit of Newton iterations
-CLOSED = 1e-6  # distance after a period below which an orbit is closed, natural sizes
-LOOSE = 1e3  # as CLOSED, in integration tolerances, if that is more
-ATTRACTS = 1e-3  # distance of multipliers from 1 that finite differences resolve
-WORTH = 0.1  # error of the trivial multiplier above which the others are not used
-ON = 0.05  # largest distance of the run from the orbit, over the orbit's size
-PRECISE = 0.01  # allowed error of the orbit over its size
+CLOSED = 1e-6  # an orbit is closed if start and end of a period are closer than this, in natural sizes
+LOOSE = 1e3  # an orbit is closed, too, if they are closer than this number of integration tolerances
+ATTRACTS = 1e-3  # smallest distance of multipliers from 1 that finite differences resolve
+WORTH = 0.1  # error of the trivial multiplier above which the other multipliers are not used
+ON = 0.05  # largest distance of the run from the orbit, as a share of the orbit's size
+PRECISE = 0.01  # allowed error of the orbit, as a share of its size
 AWAY = 1e-3  # distance from steady sliding, natural sizes, below which a closed orbit is not distinguished from it
 DONE = STATUSES.index("done")
 
 
 def on_long_cycle(runs: MotionBatch, one: int, state: Array, unknowns: Array) -> bool:
-    """True if one run, now at `state` (n,), is on an attracting cycle of several slip events or turns.
+    """True if the run of index `one`, now at `state` (n,), is on an attracting cycle of several slip events or turns.
 
     `unknowns` (u,) solve the algebraic equations at `state`, NaN where they are not known. False for structures whose
     variational equations take long to compile.
@@ -137,7 +137,7 @@ def _turned(
 
 
 def _attraction(derivative: Array, ahead: Array) -> Array:
-    """Distance inside the unit circle of all multipliers but the trivial one, (k,); 0 if uncertain.
+    """Distance (k,) of the largest multiplier except the trivial one from the unit circle, inwards; 0 if uncertain.
 
     `ahead` (k, n) are the rates. Their direction, which the flow maps to itself, is deflated first: together with the
     trivial multiplier, another one near 1 would be a double one and lose half of its digits. The error of the trivial

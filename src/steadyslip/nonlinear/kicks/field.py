@@ -14,7 +14,7 @@ from steadyslip.model.scales import natural_scales
 from steadyslip.motion.single import areas as areas_of
 from steadyslip.nonlinear.kicks.rest import Rest, in_columns
 
-ROUNDING = 1e-14  # rounding error of stresses over the normal stress
+ROUNDING = 1e-14  # rounding error of stresses, as a share of the normal stress
 BALANCED = 12  # limit of Newton iterations for the balance of forces
 
 
@@ -72,7 +72,7 @@ def solved_at(rest: Rest, states: Array) -> tuple[Array, Array, Array]:
         moving = numbers[..., n : n + speeds].min(axis=2)
         rates = numbers[..., :n]
         if count:
-            rounding = ROUNDING * sensitivity * _forces(rest)[:, None, None]  # large where mass is small
+            rounding = ROUNDING * sensitivity * _forces(rest)[:, None, None]  # large if mass is small
             settled = np.abs(change) <= 1e-10 * (np.abs(unknowns) + _sizes(rest)[:, None, :]) + rounding
             rates = np.where(np.all(settled, axis=2)[..., None], rates, np.nan)
     return rates, moving, unknowns

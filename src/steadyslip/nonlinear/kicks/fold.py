@@ -14,8 +14,8 @@ from steadyslip.nonlinear.kicks.rest import Rest
 
 REACH = 60.0  # range of ln(velocity/drive), to both sides of 0, in which a fold is searched for
 COUNT = 2401  # number of velocities in the first scan of that range
-BISECTIONS = 60  # halve 2 REACH/COUNT down to rounding
-NEAR = 1e-7  # largest residual force over the normal stress at a fold
+BISECTIONS = 60  # number of bisections that reduce 2 REACH/COUNT to rounding
+NEAR = 1e-7  # largest residual force at a fold, as a share of the normal stress
 CLOSE = 1e-3  # largest difference of ln(velocity/drive) between the state and a fold
 
 
@@ -46,7 +46,7 @@ def at_fold(rest: Rest, states: Array, unknowns: Array | None = None) -> Array:
 
 
 def _balance(rest: Rest, states: Array, turns: Array) -> tuple[Array, Array]:
-    """Residual force (m, k) and its derivative at velocities `turns` (m, k): asinh or ln of velocity over drive."""
+    """Residual force (m, k) and its derivative at `turns` (m, k), which are asinh or ln of velocity over drive."""
     given = [rest.column(np.asarray(number)) for number in rest.arguments()]
     unknown = turns
     if rest.reduction.velocity == "linear":

@@ -49,7 +49,7 @@ def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Pro
 
 
 def refuse_jump(rig: Slider | Machine) -> None:
-    """Raise NotAvailable if a step of the load point would need an infinite force (dashpot), or moves nothing."""
+    """Raise NotAvailable if a step of the load point would need an infinite force (dashpot) or would move nothing."""
     if rig.bodies and not any(LOAD_POINT in e.senses for e in rig.mechanism().elements):
         raise NotAvailable(
             "a displacement step of the drive moves nothing where no link is between the drive and a body, only the "
@@ -64,7 +64,7 @@ def refuse_jump(rig: Slider | Machine) -> None:
 
 
 def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, Array]:
-    """SI unit of a kick, its amount at size 1, and for a blow the change of velocity at size 1 (else 0)."""
+    """SI unit of a kick, amount of a kick of size 1, and change of velocity by a blow of size 1 (0 for other kicks)."""
     model, point, none = jobs.point.model, jobs.point, np.zeros(1)
     if not rest.is_machine:
         drive = np.abs(np.asarray(point.drive, dtype=float))
@@ -117,7 +117,7 @@ def _largest_force(point: OperatingPoint, model: Model) -> Array:
 
 
 def _force(point: OperatingPoint, model: Model, at: str) -> Array:
-    """Largest steady normal force (N, for rotations N m) at a body, each contact's force times its lever."""
+    """Largest steady normal force times lever of the contacts of a body (N, for rotations N m)."""
     numbers = [np.asarray(one, dtype=float) for one in point.evaluate(_levers(model, at))]
     forces = [np.abs(lever) * force for lever, force in zip(numbers, _normal_forces(point, model), strict=True)]
     largest: Array = np.maximum.reduce(np.broadcast_arrays(*forces))
@@ -150,7 +150,7 @@ def largest_blow(jobs: Jobs, at: str, change: Array) -> float:
     Infinite where it stops no contact with such a law: it accelerates contacts, or their laws allow slip both ways.
     """
     model, point, found = jobs.point.model, jobs.point, math.inf
-    if not at:  # a slider's block
+    if not at:  # the block of a slider
         return 1.0 if np.any(change < 0) and jobs.reduction.slidings[0].one_way else found
     steady = [np.asarray(one, dtype=float) for one in point.evaluate(coordinate_speeds(model))]
     names = [one.name for one in model.coordinates]
@@ -166,7 +166,10 @@ def largest_blow(jobs: Jobs, at: str, change: Array) -> float:
 
 
 def _share_of_blow(model: Model, at: str) -> dict[str, float]:
-    """Change of velocity of each coordinate for a blow that changes that of point `at` by 1; inertias are equal."""
+    """Change of velocity of each coordinate by a blow that changes the velocity of point `at` by 1.
+
+    The coordinates of a structure have equal inertias.
+    """
     row = {name: float(share) for name, share in model.points[at].items()}
     size = sum(share**2 for share in row.values())
     return {name: share / size for name, share in row.items()}
@@ -190,7 +193,10 @@ def _inertias(model: Model) -> ArrayFunction:
 
 @cached
 def _levers(model: Model, at: str) -> ArrayFunction:
-    """Compiled function: slip rate of each contact per velocity of a body that moves alone (or, if that is 0, all)."""
+    """Compiled function that returns the slip rate of each contact per velocity of a body that moves alone.
+
+    If it slips at no contact when it moves alone, all bodies move.
+    """
     body = model.coordinates[_place(model, at)]
     found = []
     for contact in model.contacts:

@@ -23,12 +23,12 @@ from steadyslip.nonlinear.kicks.field import slopes_at, solved_at
 from steadyslip.nonlinear.kicks.rest import Rest
 
 STEP = 6e-3  # step of finite differences, in natural sizes: truncation error STEP**4 is about the rounding error
-PLACES = np.array([-2.0, -1.0, 1.0, 2.0])  # points of differences, in steps; weights for both derivatives follow
+PLACES = np.array([-2.0, -1.0, 1.0, 2.0])  # points of the finite differences, in steps; weights follow below
 FIRST = np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 SECOND = np.array([-1.0, 16.0, 16.0, -1.0]) / 12.0
 REACH = 8.0  # largest distance |q| at which V is evaluated
 BISECTIONS = 24  # number of bisections of that distance
-RESONANT = 0.1  # |m·λ| over the sum of |λ|, below which a term is left
+RESONANT = 0.1  # a term is not cancelled if |m·λ| is less than this share of the sum of |λ|
 
 
 def terms(rest: Rest, basis: Array, inverse: Array) -> tuple[Array, Array]:
@@ -66,13 +66,13 @@ class Rays:
         for gradient, form in zip(gradients, (v3, v4), strict=True):
             order = form.ndim - 1
             places, times = _monomials(way.shape[2], order - 1)
-            for i, own in enumerate(form):  # one rig at a time: all monomials of many rays take 100 MB
+            for i, own in enumerate(form):  # rig by rig: all monomials of many rays take 100 MB
                 products = prod(entries[place, i] for place in places)
                 gradient[i] = products.T @ (order * times * own[:, *places]).T
         return cls(way, *gradients)
 
     def part(self, which: Array) -> Rays:
-        """Rays of some of the rigs."""
+        """The rays of the rigs with indices `which`."""
         return Rays(self.way[which], self.gradient3[which], self.gradient4[which])
 
     @cached_property
@@ -172,7 +172,7 @@ def _times(matrix: Array, form: Array) -> Array:
 
 
 def _in(form: Array, matrix: Array, count: int) -> Array:
-    """Forms with their last `count` indices transformed to new coordinates, where old = `matrix` new."""
+    """The forms with their last `count` indices transformed to new coordinates, where old = `matrix` · new."""
     for _ in range(count):
         form = np.moveaxis(
             _times(np.swapaxes(matrix, 1, 2), np.moveaxis(form, -1, 1)), 1, form.ndim - count

@@ -15,7 +15,7 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import natural_scales
 
-NEUTRAL = 1e-8  # growth or decay per radian below which small motions count as neutral
+NEUTRAL = 1e-8  # small motions are neutral if they grow or decay by less than this per radian of oscillation
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Rest:
     ----------
     reduction : Reduction
     point : OperatingPoint
-        The rigs; numbers or (m,).
+        Parameters of the rigs, as numbers or arrays (m,).
     velocity, force, pressure : ndarray (m,)
         Velocity of the load point, m/s; force on a body, N; added normal stress, Pa, for machines N.
     state : ndarray (m, n)
@@ -93,7 +93,7 @@ class Rest:
 
     @property
     def time(self) -> Array:
-        """Natural time (m,), s: in which the load point moves by its natural length, or else a body by its own."""
+        """Natural time (m,), s: the time in which the load point, or else a body, moves by its natural length."""
         by_load = self.natural_slip / np.abs(self.velocity)
         if np.all(np.isfinite(by_load)):
             return np.asarray(by_load)
@@ -143,7 +143,7 @@ class Rest:
             return np.asarray((self.leading.real < 0) & ~self.neutral)
 
     def part(self, which: Array) -> Rest:
-        """Steady sliding of some of the rigs."""
+        """Steady sliding of the rigs with indices `which`."""
         own = (getattr(self, name)[which] for name in (
             "velocity", "force", "pressure", "state", "unknowns", "scales", "matrix", "roots"))  # fmt: skip
         return Rest(self.reduction, self.point.part(which), *own)

@@ -26,17 +26,18 @@ from steadyslip.nonlinear.kicks.rest import Rest, in_columns
 
 S = inner_symbol("s", positive=True)
 """Normal stress in steady sliding at the new inputs, the unknown; the rig's own is σss."""
-STEPS = 8  # number of steps from the rig's own inputs to the new ones, where there is no closed form
+STEPS = 8  # number of steps from the rig's own inputs to the new inputs, where there is no closed form
 ROUNDS = 40  # limit of Newton iterations
 SETTLED = 1e-9  # size of the Newton step at convergence, in natural sizes
-ROUNDED = 1e-5  # as SETTLED, if rounding keeps the step from shrinking further
+ROUNDED = 1e-5  # used instead of SETTLED if rounding keeps the Newton step from shrinking further
 
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """Compiled functions of parameters, own σss, v_lp, p and normal stress s, for steady sliding at other inputs.
+    """Compiled functions for steady sliding at other inputs than the rig's own.
 
-    `stress` returns the residual of the equation for s and its derivative, `state` the state; `affine`: linear in s.
+    Their arguments are the parameters, the rig's own σss, v_lp, p and the normal stress s. `stress` returns the
+    residual of the equation for s and its derivative, `state` the steady state. `affine`: the equation is linear in s.
     """
 
     affine: bool
@@ -193,7 +194,7 @@ def _steady_state_of(reduction: Reduction) -> ArrayFunction:
     speeds = {contact.velocity: moved(model.steady[contact.velocity]) for contact in model.contacts}
     steady |= {contact.friction: moved(model.steady[contact.friction]) for contact in model.contacts}
     for sliding in reduction.slidings:
-        if sliding.variable is not None:  # scaled by the rig's own velocity, whatever the load point's is
+        if sliding.variable is not None:  # scaled by the rig's own velocity, whatever the velocity of the load point
             steady[sliding.variable.w] = sliding.variable.w_of_v.xreplace(steady | speeds)
     return model.function((steady[symbol] for symbol in (*reduction.state, *reduction.unknowns)), FASTER)
 

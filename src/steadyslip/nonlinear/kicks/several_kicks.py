@@ -59,7 +59,7 @@ def thresholds_shown(rig: Slider | Machine, kicks: Sequence[str], **options: Any
             report(0, 0.0, math.inf)
             try:
                 found.append(threshold(rig, kick, **options, progress=report))
-            except KeyboardInterrupt:  # before the search of this kick began; earlier results are kept
+            except KeyboardInterrupt:  # before the search for this kick's threshold began; earlier thresholds are kept
                 if not found:
                     raise
                 return Thresholds(rig, tuple(found), True)

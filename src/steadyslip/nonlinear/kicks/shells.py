@@ -25,15 +25,15 @@ from steadyslip.nonlinear.kicks.neighbourhood import LARGEST
 from steadyslip.nonlinear.kicks.spans import CERTAIN, OPEN, RETURNS, MotionBatch, advanced_runs
 
 DONE = STATUSES.index("done")
-COUNT = 32  # number of shells, from the ball of `neighbourhood` to a few natural sizes
-FINE = 24  # number of shells between the last that falls and the first that rises, in each refinement
+COUNT = 32  # number of shells between the ball of `neighbourhood` and a distance of a few natural sizes
+FINE = 24  # number of shells between the last with inward and the first with outward drift, in each refinement
 REFINED = 2  # number of refinements
-NOISE = 25.0  # drift in a turn, in tolerances per step, above which it exceeds the errors of integration
-SHARE = 0.02  # smallest significant drift, as a share of the linear decay per turn
+NOISE = 25.0  # least significant drift in a turn, as a multiple of the tolerance per integration step
+SHARE = 0.02  # least significant drift in a turn, as a share of the linear decay in a turn
 POINTS = 16  # number of starting points on the outer rim of a band for the outcome beyond it
 ROUNDS = 12  # limit of Newton iterations for the time of a turn
-FLAT = 2.0  # decay per radian of the other modes above which motion takes place on a surface
-SLOW = 0.02  # decay per radian of the leading mode above which simulation is as fast
+FLAT = 2.0  # if all other modes decay by more than this per radian, motion takes place on a surface
+SLOW = 0.02  # if the leading mode decays by more than this per radian, simulation is as fast as shells
 
 
 class Shells:
@@ -72,13 +72,16 @@ class Shells:
             away[useful] = self._on_ray(which[useful], states[useful])
         found = np.where(away < self.inner[group], RETURNS, OPEN)
         inside = (away > self.band[group, 0]) & (away < self.band[group, 1])
-        for one in np.unique(group[inside & ~self.fate_known[group]]):  # costly: only for bands with a motion in them
+        for one in np.unique(group[inside & ~self.fate_known[group]]):  # slow: only for bands with a motion
             fate = self._fate(one, self.band[one, 1])
             self.fate_known[one], self.beyond[one] = True, fate if fate in CERTAIN else OPEN
         return np.where(inside, self.beyond[group], found)
 
     def _ensure_computed(self, group: Array) -> None:
-        """Compute the shells of some rigs, unless known, or simulation is as fast, or motion is not on a surface."""
+        """Compute the shells of some rigs, unless they are known or useless.
+
+        They are useless where simulation is as fast, or where motion does not take place on a surface.
+        """
         rest, near = self.runs.rest, self.runs.near
         group = group[~self.known[group]]
         self.known[group] = True
@@ -97,7 +100,7 @@ class Shells:
             blurred = NOISE * self.runs.jobs.options.rtol * np.abs(leading.imag / (2 * np.pi * leading.real))
         radii = np.geomspace(np.clip(blurred, near.radius[group], 0.5 * LARGEST), LARGEST, COUNT, axis=1)
         falls, rises = self._drift(group, radii)
-        falls[:, 0] |= radii[:, 0] == near.radius[group]  # the neighbourhood itself
+        falls[:, 0] |= radii[:, 0] == near.radius[group]  # the neighbourhood's ball itself
         clear = falls[:, 0]
         group, radii, falls, rises = group[clear], radii[clear], falls[clear], rises[clear]
         if not len(group):
@@ -116,7 +119,7 @@ class Shells:
         self.band[group] = np.column_stack([begin, end])
 
     def _drift(self, group: Array, radii: Array) -> tuple[Array, Array]:
-        """True (k, r) where distances fall, and True where they rise, over a turn from radii (k, r) on the ray."""
+        """Masks (k, r): where the distance falls, and where it rises, over a turn from radii (k, r) on the ray."""
         rest, near = self.runs.rest, self.runs.near
         n = rest.state.shape[1]
         away = radii[:, :, None] * near.basis[group][:, None, :, 0]
@@ -125,7 +128,7 @@ class Shells:
         lane, each = np.repeat(group, radii.shape[1]), np.repeat(turn, radii.shape[1])
         begin = radii.ravel()
         end, states = self._to_ray(lane, states, each)
-        if n > 2:  # on the surface now
+        if n > 2:  # the first turn has brought them onto the surface
             begin = end
             end, _ = self._to_ray(lane, states, each)
         least = SHARE * np.abs(rest.leading[group].real * turn)[:, None]
@@ -134,9 +137,9 @@ class Shells:
         return change < -least, change > least
 
     def _to_ray(self, which: Array, states: Array, guess: Array) -> tuple[Array, Array]:
-        """Distances (k,) at which runs from `states` (k, n) cross the ray near times `guess` (k,), s, and the states.
+        """Distances (k,) at which runs from `states` (k, n) cross the ray near times `guess` (k,), s, and states there.
 
-        NaN where they do not; distances are those in the slowest two modes.
+        NaN where a run does not cross it. Distances are measured in the plane of the two slowest modes.
         """
         rest, near = self.runs.rest, self.runs.near
         time, radius, found = guess.copy(), np.full(len(which), np.nan), np.full_like(states, np.nan)
@@ -163,11 +166,11 @@ class Shells:
         return radius, found
 
     def _on_ray(self, which: Array, states: Array) -> Array:
-        """Distance |q| (k,) at which runs from `states` (k, n) next cross the ray; inf where they do not."""
+        """Distance |q| (k,) at which runs from `states` (k, n) cross the ray next; inf where they do not cross it."""
         rest, near = self.runs.rest, self.runs.near
         q = near.coordinates(which, states)
         sense = self._sense(which)
-        angle = np.mod(-sense * np.arctan2(q[:, 1], q[:, 0]), 2 * np.pi)  # left to the ray
+        angle = np.mod(-sense * np.arctan2(q[:, 1], q[:, 0]), 2 * np.pi)  # angle that is left to the ray
         found, _ = self._to_ray(which, states, (angle + 2 * np.pi) / np.abs(rest.leading[which].imag))
         return np.where(np.isnan(found), np.inf, found)
 
@@ -194,7 +197,7 @@ class Shells:
 def _drifts(radii: Array, falls: Array, rises: Array) -> tuple[Array, Array, Array]:
     """Radius up to which distances fall, and first and last radius at which they rise (inf if none), (k,) each.
 
-    `radii` (k, r) rise; `falls` and `rises` (k, r) are True where the distance does so over a turn.
+    `radii` (k, r) are in rising order; `falls` and `rises` (k, r) are True where the distance falls or rises in a turn.
     """
     count, each = radii.shape[1], np.arange(len(radii))
     last = np.argmin(np.column_stack([falls, np.zeros(len(radii), dtype=bool)]), axis=1) - 1

@@ -34,23 +34,23 @@ RETURNS, BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION, INTERRUPTED, UNDECIDED
 LATE, EXHAUSTED, SPENT, STUCK, UNSEEN = range(UNDECIDED, len(OUTCOMES))
 CERTAIN = (BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION)
 """Decided outcomes other than a return."""
-OPEN = -1  # in arrays of outcomes: not decided yet
+OPEN = -1  # in arrays of outcomes: the outcome is not decided yet
 
-USUAL = 3  # number of state variables of a slider, for which budgets of steps are given
-FEWEST = 100  # least limit of steps of one motion, whatever is left to all
-STIFF = "rodas4"  # method for stiff motions, and for those for which the explicit method needs too many steps
+USUAL = 3  # number of state variables of a slider; budgets of steps refer to this number
+FEWEST = 100  # least limit of steps of one motion, however few steps are left to all motions
+STIFF = "rodas4"  # method for stiff motions, and for motions for which the explicit method needs too many steps
 LOADING = 40.0  # advance of the load point in the first span, natural lengths; each span is twice as long as the last
 TURNS = 3.0  # added to the first span, natural periods
 DECAYS = 6.0  # added to the first span, decay times
 MOST_TURNS = 1000.0  # longest simulated time, natural periods
-MOST_DECAYS = 20.0  # longest simulated time, decay times, if that is more
+MOST_DECAYS = 20.0  # longest simulated time in decay times; the longer of this and MOST_TURNS counts
 MOST_LOADING = 4000.0  # added to the longest simulated time, natural lengths of advance
-RELOAD = 1.5  # factor on the time in which the load point catches up with the block, during which nothing is decided
+RELOAD = 1.5  # factor on the time in which the load point catches up with the block; nothing is decided earlier
 NEUTRAL_TURNS = 100.0  # natural periods of bounded motion that count as a return if sliding is neutrally stable
 
 
 def doubt_of(outcome: int) -> str:
-    """Reason for an undecided outcome; empty for others."""
+    """Reason for which an outcome is undecided; empty for other outcomes."""
     return DOUBTS[outcome - UNDECIDED] if UNDECIDED <= outcome < len(OUTCOMES) else ""
 
 
@@ -66,7 +66,7 @@ class StepBudget:
         return cls(steps * min(1.0, (USUAL / variables) ** power))
 
     def each(self, motions: int, most: int) -> int:
-        """Limit of the steps of each of several motions in one span: `most`, or an equal share of what is left."""
+        """Limit of the steps of each of several motions in one span: `most`, or an equal share of the steps left."""
         return int(min(most, max(FEWEST, self.steps / motions)))
 
 
@@ -89,7 +89,7 @@ class MotionBatch:
     effort : float
         Factor on the longest simulated time.
     budget : StepBudget
-        Motions without an outcome when it is used up are undecided.
+        Integration steps left; motions without an outcome when they are used up are undecided.
     """
 
     jobs: Jobs
@@ -123,7 +123,7 @@ class MotionBatch:
         return first, reload + loading * unit + turns * np.where(rest.neutral, 1.0, self.effort)
 
     def reload(self, which: Array, states: Array) -> Array:
-        """Time (k,), s, in which the load point makes up the distance of states (k, n) from steady sliding."""
+        """Time (k,), s, in which the load point advances by the distance of states (k, n) from steady sliding."""
         slips = list(self.rest.places)
         away = np.abs(states[:, slips] - self.rest.state[which][:, slips]) / self.rest.speeds[which]
         return np.asarray(np.nan_to_num(RELOAD * np.max(away, axis=1)))
@@ -160,17 +160,17 @@ class SpanResults:
 
     @classmethod
     def empty(cls, count: int, n: int, unknowns: int) -> SpanResults:
-        """Placeholder for runs not simulated yet."""
+        """`SpanResults` filled with placeholders, for `count` runs that are not simulated yet."""
         return cls(np.full(count, len(STATUSES)), np.zeros(count), np.full((count, n), np.nan),
                    np.full((count, unknowns), np.nan), np.zeros(count),
                    np.full((count, len(TALLY)), np.nan))  # fmt: skip
 
     def part(self, which: Array) -> SpanResults:
-        """Entries of some of the runs."""
+        """Results of the runs with indices `which`."""
         return replace(self, **{name: getattr(self, name)[which] for name in ARRAYS})
 
     def put(self, which: Array, found: SpanResults) -> None:
-        """Store entries for some of the runs."""
+        """Store the results `found` for the runs with indices `which`."""
         for name in ARRAYS:
             getattr(self, name)[which] = getattr(found, name)
         self.whole = self.whole and found.whole
@@ -199,7 +199,7 @@ def advanced_runs(
         segments=constant_inputs(span, velocity, jump, pressure, force), size=len(which),
     )  # fmt: skip
     machine: Runner = jobs.runner(LANES, dense=True)
-    _ = machine.code.advance  # compile before the threads start
+    _ = machine.code.advance  # compiles the kernel before the threads start
     count, own = len(which), rest.contact * len(TALLY)
     found = SpanResults.empty(count, rest.state.shape[1], rest.unknowns.shape[1])
 

@@ -34,7 +34,7 @@ from steadyslip.nonlinear.kicks.spans import (
 )
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, NormalStressStep, VelocityStep
 
-COARSE = 192  # number of sizes in the first scan
+COARSE = 192  # number of kick sizes in the first scan
 BLOCK = 48  # number of sizes simulated side by side
 FINE = 47  # number of sizes between the ends of a bracket in each round of narrowing
 AT_EDGE = 1e-5  # least relative width of a bracket at an edge of stability, near which motions return very slowly
@@ -44,10 +44,10 @@ LASTING = (
     "normal-force",
     "force",
 )  # kicks that change an input for good, except blows
-USED_UP = tuple(map(doubt_of, (LATE, EXHAUSTED, SPENT)))  # doubts of motions that would need more time or steps
+USED_UP = tuple(map(doubt_of, (LATE, EXHAUSTED, SPENT)))  # doubts about motions cut short
 TOGETHER = 256  # number of steady slidings after kicks that are solved for together
-BITS = 60  # halvings of a bracket that reach rounding
-BEYOND = 1.01  # factor on the size of an edge at which the outcome beyond is simulated
+BITS = 60  # number of halvings that narrow a bracket to rounding
+BEYOND = 1.01  # the outcome beyond an edge is simulated at this multiple of the edge's size
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Threshold(Displayed):
         return self._found() + self._way_out()
 
     def _way_out(self) -> str:
-        """Clause on how to decide more kicks if time or steps were used up; else empty."""
+        """Clause on how to decide more kicks, if time or steps were used up; empty otherwise."""
         if self.decided or self.interrupted or self.doubt not in USED_UP:
             return ""
         modes = ", fewer modes (kept_modes)" if self.rig.mechanism().structures else ""
@@ -127,7 +127,7 @@ class Threshold(Displayed):
         )
 
     def _found(self) -> str:
-        """The bracket, and what lies beyond it or why it is not known."""
+        """Text on the bracket, and on the outcome beyond it or why that is not known."""
         lasts = " that lasts" if self.kick in LASTING and not (self.at and self.kick == "velocity") else ""
         what = f"{self.kick} kick{lasts}{f' at {self.at}' if self.at else ''}"
         low, _ = self.bracket
@@ -298,7 +298,7 @@ class _Search:
         sizes = np.geomspace(self.kicked.kick.low, self.kicked.highest, COARSE)
         self.edge = self.high = float(edges(self.kicked, np.zeros(1, dtype=int), sizes)[0])
         self._scan(sizes[sizes < self.edge])
-        least = precision * self.kicked.kick.low  # absolute width that suffices where even the smallest kicks fail
+        least = precision * self.kicked.kick.low  # sufficient width if even the smallest kicks fail
         while np.isfinite(self.high) and self.high - self.low > max(self._enough(precision), least):
             width = self.high - self.low
             self._narrow(self.low + width * np.arange(1, FINE + 1) / (FINE + 1), PATIENCE)
@@ -309,7 +309,7 @@ class _Search:
             found = int(self._outcomes(np.array([beyond]), PATIENCE)[0])
             if found == INTERRUPTED:
                 raise KeyboardInterrupt
-            self.outcome = LATE if found == RETURNS else found  # neutral sliding at the edge survives nothing
+            self.outcome = LATE if found == RETURNS else found  # neutrally stable sliding at the edge survives no kick
 
     def _enough(self, precision: float) -> float:
         """Width of the bracket, dimensionless, at which narrowing ends."""
@@ -321,7 +321,7 @@ class _Search:
         return bool(np.isfinite(self.high) and self.high == self.edge)
 
     def _scan(self, sizes: Array) -> None:
-        """Simulate rising sizes up to the first failure, at most one block beyond the first undecided one."""
+        """Simulate kicks of rising sizes up to the first failure, or one block beyond the first undecided kick."""
         for start in range(0, len(sizes), BLOCK):
             block, low = sizes[start : start + BLOCK], self.low
             doubt = self.outcome >= UNDECIDED
@@ -332,7 +332,7 @@ class _Search:
                 break
 
     def _narrow(self, sizes: Array, effort: float) -> None:
-        """Simulate rising sizes inside the bracket and narrow it."""
+        """Simulate kicks of rising sizes inside the bracket, and narrow the bracket."""
         if not len(sizes):
             return
         found = self._outcomes(sizes, effort)
@@ -382,7 +382,7 @@ class _Search:
 def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
     """Smallest size beyond which no stable steady sliding exists after the kick, (n,); inf if none is found.
 
-    The first of the rising `sizes` without one is found, then the bracket is narrowed to rounding.
+    The first of the rising `sizes` without stable steady sliding is found, then the bracket is narrowed to rounding.
     """
     low, high = np.zeros(len(which)), np.full(len(which), np.inf)
     going, start = np.arange(len(which) if kicked.moves_rest else 0), 0
@@ -403,7 +403,10 @@ def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
 
 
 def _bracket(low: Array, high: Array, which: Array, sizes: Array, good: Array) -> None:
-    """Narrow brackets `low`, `high` of some rigs to the first of rising `sizes` (k, s) that is not `good` (k, s)."""
+    """Narrow the brackets `low`, `high` of rigs `which` (k,) around the first of rising `sizes` that is not `good`.
+
+    `sizes` and `good` have shape (k, s).
+    """
     first = np.where(good.all(axis=1), sizes.shape[1], np.argmin(good, axis=1))
     ends = np.column_stack([low[which], sizes, high[which]])
     low[which], high[which] = (np.take_along_axis(ends, first[:, None] + i, axis=1)[:, 0] for i in (0, 1))
@@ -435,7 +438,7 @@ class KickMargin(Displayed):
 
     @property
     def survives(self) -> bool | None:
-        """True if the step returns to steady sliding; None if undecided."""
+        """True if the motion returns to steady sliding after the step; None if undecided."""
         return None if self.outcome == "undecided" else self.outcome == "returns"
 
     def __str__(self) -> str:

@@ -1,8 +1,9 @@
-"""Detection of a displacement that moves with friction, as one measured across the fault or behind a yielding part.
+"""Detection of a spring between displacement sensor and load point, by which the displacement varies with friction.
 
-Such a displacement is that of the load point minus friction times the compliance of a spring. A model of a few steps of
-the rate plus a term in proportion to friction then fits as well as a course with many more changes. On a soft press, a
-course that is fitted without this term has changes and servos that friction causes; therefore the times of steps are
+A sensor across the fault, or behind a part of the machine that yields, measures the displacement of the load point
+minus friction times the compliance of a spring. A few steps of the load-point rate plus a term proportional to friction
+then fit the measured displacement as well as a course with many more changes. On a soft machine, a course fitted
+without this term contains changes and servo responses that friction causes; therefore the times of the steps are
 searched with the term from the start.
 """
 
@@ -24,21 +25,21 @@ from steadyslip.experiments.numerics.splitting import displacement_noise, level_
 WITH_FRICTION = -0.5
 """Displacement moves with friction if their correlation is below this. In 50 records of the load point it was above
 -.05; in 18 records measured across the fault it was below in 12 (others had much noise, or changes in its place)."""
-REPEATS = 3  # how often the course is found again without the stretch of the spring
-MARGIN = 5.0  # allowed excess of the squared deviations of steps with friction over those of a course, in samples
+REPEATS = 3  # number of times that the course is found again after the spring's stretch was added to the displacement
+MARGIN = 5.0  # over the number of samples: relative excess of the scatter about steps that is allowed over the course's
 BESIDE = 2.0  # a course follows a displacement if deviations are at most this multiple of the sample-to-sample noise
-SLOW = 2.0  # largest ratio of the whole noise of friction to its sample-to-sample noise
+SLOW = 2.0  # largest assumed ratio of the noise of friction, slow noise included, to its sample-to-sample noise
 CERTAIN = 8.0  # standard errors by which a compliance must exceed 0; in 270 records of the load point two did
-MOST_MEMORY = 0.9  # largest correlation of neighbouring samples that is taken into account in these errors
-ROUGHLY = 2.0  # limits for means of samples are weaker than those for samples by this factor
-KEPT = 0.5  # least share of the compliance that must remain when the course is found again
+MOST_MEMORY = 0.9  # largest correlation of neighbouring residuals by which the error of a compliance is increased
+ROUGHLY = 2.0  # limits for means of neighbouring samples are weaker by this factor than limits for single samples
+KEPT = 0.5  # least share of the first compliance that must remain after the course was found again
 MEANS = 200  # number of means of samples on which steps are searched
-MOST_STEPS = 6  # most steps in the search
+MOST_STEPS = 6  # largest number of steps tried in the search
 EXCHANGES = 4  # most rounds in which each step is replaced by a better one; one or two suffice
-STEPS_OF_TIMES = 6  # iterations of Newton's method for the times of steps; two or three suffice near them
-FEWEST = 5  # least number of samples between two changes that count in the correlation
-APART = 2  # distance, in samples, of the neighbours whose friction is averaged; chosen by trial
-SINGULAR = 1e-6  # a regressor with a smaller share independent of the others counts as dependent on them
+STEPS_OF_TIMES = 6  # iterations of Newton's method for the times of steps; two or three suffice from close starts
+FEWEST = 5  # samples between two changes are used in the correlation if there are at least this many
+APART = 2  # friction is averaged over the neighbours this many samples before and after a sample; chosen by trial
+SINGULAR = 1e-6  # a regressor is left out if a smaller share of its square is independent of the other regressors
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,9 @@ class Yielding:
 def yielding(time: Array, displacement: Array, friction: Array, course: Course) -> Yielding | None:
     """Spring between sensor and load point, and the course of the load point; None if there is no such spring.
 
-    There is a spring if the displacement moves with friction about the lines of its course, or if fewer steps with a
-    term of friction fit as well as the course. The course is found again from the displacement plus the stretch of the
-    spring, repeatedly.
+    There is a spring if deviations of the displacement from straight lines correlate with friction, or if fewer steps
+    of the rate plus a term proportional to friction fit as well as `course`. The course of the load point is then found
+    again, several times, from the displacement plus the stretch of the spring.
     """
     if not course.strays > EXACTLY * float(np.ptp(displacement)):
         return None
@@ -83,7 +84,7 @@ def yielding(time: Array, displacement: Array, friction: Array, course: Course) 
 
 
 def _is_late(course: Course) -> bool:
-    """True if the load point follows changes late, in pieces or along a smooth curve, or possibly does."""
+    """True if a servo response, a series of ramps, a smooth curve or a second course is part of the course."""
     late = any(change.lag or change.pieces for change in course.changes)
     return late or course.otherwise is not None or course.curve is not None
 
@@ -108,12 +109,12 @@ class _SensorData:
     apart: int = APART
 
     def stretch(self, course: Course) -> float:
-        """Stretch per friction (m), from steps of the rate or else from deviations from a course; 0 if none."""
+        """Stretch of the spring per unit of friction (m), from steps or else from a correlation; 0 without a spring."""
         lost, together = self.slope(course)
         return self.stretch_by_steps(course) or (lost if together <= WITH_FRICTION else 0.0)
 
     def stretch_by_steps(self, course: Course) -> float:
-        """Stretch per friction (m) with which the fewest steps of the rate fit as well as a course; 0 if none do."""
+        """Stretch per unit of friction (m) from the fewest steps of the rate that fit as well as a course; else 0."""
         off = self.displacement - (course.otherwise or course).integral(self.time)
         astray = np.std(off) > BESIDE * displacement_noise(self.time, self.displacement)
         smooth = course.otherwise is not None or course.curve is not None
@@ -126,7 +127,7 @@ class _SensorData:
         return 0.0
 
     def stretch_near(self, times: Array, off: Array, smooth: bool, leeway: float = 1.0) -> float:
-        """Stretch per friction (m) if steps with a term of friction fit as well as a course; 0 if they do not.
+        """Stretch per unit of friction (m) from a fit of steps and friction; 0 if it fits worse than a course.
 
         Parameters
         ----------
@@ -137,7 +138,7 @@ class _SensorData:
         smooth : bool
             True for a course with so many parameters that it fits part of the noise.
         leeway : float, optional
-            Factor by which the deviations from the steps may be larger.
+            Factor by which the deviations from the steps may exceed their limit.
         """
         lost, error, strays = self.steps_and_friction(times)
         noise = displacement_noise(self.time, self.displacement)
@@ -148,7 +149,7 @@ class _SensorData:
         return lost if lost > CERTAIN / leeway * error and strays <= most else 0.0
 
     def _means(self, off: Array) -> tuple[_SensorData, Array]:
-        """Means of neighbouring samples of all columns, and of `off` (n,); they move with friction as samples do."""
+        """Data and values `off` (n,) averaged over neighbouring samples; the stretch per unit of friction is kept."""
         starts = np.arange(0, len(self.time), -(-len(self.time) // MEANS))
         counts = np.diff(starts, append=len(self.time))
         columns = np.vstack([self.time, self.displacement, self.friction, off, self.slips])
@@ -156,7 +157,7 @@ class _SensorData:
         return _SensorData(time, displacement, friction, np.array(slips).reshape(-1, len(time)), 0), off
 
     def steps(self, most: int) -> Iterator[Array]:
-        """Times (s) of the best single step of the rate, then of the best two steps and so on, with a friction term."""
+        """Times (s) of the step of the rate that fits best with a friction term, then of the best two, and so on."""
         t = self.time - self.time[0]
         base, _ = np.linalg.qr(np.column_stack([np.ones_like(t), t / t[-1], self.friction, *self.slips]))
         at = t[2:-2]
@@ -178,9 +179,9 @@ class _SensorData:
 
     @cached_property
     def near(self) -> Array:
-        """Mean friction (n,) of two neighbours of each sample, whose noise is independent of that of the sample.
+        """Friction (n,) of each sample, as the mean of two neighbours so that it has not the noise of the sample.
 
-        If `apart` is 0, as for means with little noise, it is the friction of the sample.
+        If `apart` is 0, as for averaged samples with little noise, the friction of the sample itself is returned.
         """
         if not self.apart:
             return self.friction
@@ -188,15 +189,15 @@ class _SensorData:
         return np.asarray(0.5 * (wide[2 * self.apart :] + wide[: -2 * self.apart]))
 
     def steps_and_friction(self, times: Array) -> tuple[float, float, float]:
-        """Stretch per friction (m), its error (m) and the scatter (m) about steps near `times` with a term of friction.
+        """Stretch per unit of friction (m), its error (m), and scatter (m), from steps near `times` and friction.
 
-        Friction of neighbours serves as instrumental variable: noise of a regressor would make its coefficient small.
+        Friction of neighbours is an instrumental variable: noise of a regressor would bias its coefficient to 0.
         """
         t, times = self.time - self.time[0], times - self.time[0]
         rates = np.array([])
         for last in [False] * STEPS_OF_TIMES + [True]:
             since = np.maximum(t - times[:, None], 0.0)
-            jumps = [] if last else list((since > 0) * 1.0)  # a jump here means that the change was earlier or later
+            jumps = [] if last else list((since > 0) * 1.0)  # a fitted jump shows how far the time of a step is off
             plain = [np.ones_like(t), t, *since, *self.slips, *jumps]
             rows, instead = (np.column_stack([-one, *plain]) for one in (self.friction, self.near))
             size = np.maximum(np.linalg.norm(instead, axis=0), 1e-300)
@@ -213,7 +214,7 @@ class _SensorData:
         return float(found[0]), error * float(np.sqrt((1 + memory) / (1 - memory))), scatter
 
     def slope(self, course: Course) -> tuple[float, float]:
-        """Stretch per friction (m) and correlation of displacement and friction about lines between changes of rate."""
+        """Stretch per unit of friction (m), and correlation of displacement and friction after removal of lines."""
         if course.curve is not None:
             return 0.0, 0.0
         both = np.stack([self.displacement - course.integral(self.time), self.friction, self.near])
@@ -239,7 +240,7 @@ def _residuals_of(values: Array, rows: Array) -> Array:
 
 
 def _best_addition(chosen: list[int], products: Array, shared: Array, able: Array) -> int:
-    """Index of the regressor that explains most of the values in addition to the `chosen` ones.
+    """Index of the regressor that explains most of the values when it is added to the regressors `chosen`.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Runs of a few samples before the first straight run of a displacement, and after the last.
 
-The segmentation of the whole record (`runs.py`) does not find a change of rate that so few samples show. They are taken
-as a run if they lie on a straight line of well-determined forward rate that meets the line of the neighbouring run.
-Other samples, such as the flank of a glitch, are left out and reported.
+The segmentation of the whole record (`runs.py`) finds no change of rate so close to an end. A few samples there are
+taken as a run if they lie on a straight line of well-determined forward rate that meets the line of the neighbouring
+run. If they do not, like the flank of a glitch, they are left out and reported.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from steadyslip.experiments.numerics.splitting import RESOLUTION
 
 OFF_LINE = 6.0  # a sample is off a line beyond this number of standard deviations
 ON_LINE = 3.0  # a sample is on a line within this number of standard deviations
-RATE_SIGMAS = 4.0  # standard errors by which two rates must differ
+RATE_SIGMAS = 4.0  # two rates are different if they differ by more than this number of standard errors
 UNKNOWN_RATE = 0.1  # a rate with a larger relative error counts as unknown; chosen by trial
 REST_SHARE = 0.1  # few samples count as at rest below this share of the next rate, if 0 is within the error; by trial
-CHI_SIGMAS = 4.0  # standard deviations by which the chi squared of samples on a line may exceed its mean
-LONGEST_END = 0.05  # longest end, as share of the samples of a record; chosen by trial
+CHI_SIGMAS = 4.0  # standard deviations by which the chi squared of samples on a line may exceed its expected value
+LONGEST_END = 0.05  # largest number of samples in such a run, as a share of the record's samples; chosen by trial
 
 
 class Line(Protocol):
     """Straight run of samples with its rate (m/s) and the index of its first sample.
 
-    `levels` holds the displacement (m) of its line at the first time of the record, with one more value for each slip
-    of the sensor within the run.
+    `levels` holds the displacement (m) at which the line of the run meets the first time of the record, with one more
+    value for each slip of the sensor within the run.
     """
 
     rate: float
@@ -51,7 +51,7 @@ def run_at_start(time: Array, displacement: Array, run: Line, noise: float) -> i
     t = time - time[0]
     off = displacement - run.levels[0] - run.rate * t
     rate, first = run.rate, run.first
-    while first > 0 and abs(off[first - 1]) <= ON_LINE * noise:  # the run may begin a little before it was cut
+    while first > 0 and abs(off[first - 1]) <= ON_LINE * noise:  # earlier samples on the line belong to the run
         first -= 1
     if first < 2 or np.any(np.abs(off[:2]) <= OFF_LINE * noise):  # one sample has no rate
         return 0

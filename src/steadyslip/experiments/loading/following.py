@@ -20,12 +20,12 @@ from steadyslip.experiments.numerics.noise import describe
 
 LONGEST_LAG = 0.2  # largest lag, as a share of the time around a change in which nothing else changes; by trial
 SPARED = 14.0  # decrease of chi squared credited to a servo for each sensor level, or half a run, that it replaces
-COARSE = 0.5  # least share of a servo's final gain that the best starting point of its search has
-AROUND = 3.0  # the neighbourhood of a change, in settling times of the servo
+COARSE = 0.5  # the best start of a servo's search has at least this share of the decrease of chi squared at its end
+AROUND = 3.0  # samples are near a change up to this many settling times of the servo before and after it
 NEAR = 30.0  # samples on each side of a change that are not averaged
-PER_EFOLD = 10.0  # number of means per e-fold of the distance from the change, further away; chosen by trial
+PER_EFOLD = 10.0  # further away, number of means per increase of the distance from the change by e; chosen by trial
 LEFT = 4.0  # standard errors by which the mean misfit around a change may exceed 1 (its mean for normal noise is 0.83)
-MOST_DESCRIBED = 4000  # samples from which the correlation of the noise is estimated
+MOST_DESCRIBED = 4000  # the correlation of the noise is estimated from at most this many samples, to limit the time
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +63,9 @@ class Kinks:
         return LONGEST_LAG * self.reach
 
     def far_levels(self, spacing: float) -> Array:
-        """Times of changes of the sensor's level outside the longest lag after a change of rate.
+        """Times at which the sensor's level changes, except those shortly after a change of rate.
 
-        Within that lag, the response of a servo may look like a change of the sensor's level.
+        Within the longest lag after a change of rate, a servo's response may look like a change of the sensor's level.
         """
         since = self.levels[:, None] - self.meets
         near = np.any((since >= -2 * spacing) & (since <= self.longest), axis=1)
@@ -75,7 +75,7 @@ class Kinks:
 def followed(
     time: Array, values: Array, noise: float, ways: Sequence[Kinks], lasting: float = 1.0
 ) -> Iterator[JointFit]:
-    """Best fit of steps, ramps or a servo to a displacement; then, if that fails around changes, a fit in pieces.
+    """Best fit of steps, ramps or a servo to a displacement; if it is poor around changes, also a fit of many ramps.
 
     Parameters
     ----------
@@ -86,9 +86,9 @@ def followed(
     noise : float
         Standard deviation of the displacement, m.
     ways : sequence of Kinks
-        All changes, then fewer and fewer of them: changes that may be part of a servo's response are left out.
+        First all changes, then fewer and fewer, as changes that may be part of a servo's response are left out.
     lasting : float
-        Least number of samples per independent sample: the gain that a servo must reach grows with it.
+        Least number of samples per independent sample. The larger it is, the more must a servo reduce chi squared.
     """
     spacing = float(np.median(np.diff(time)))
     lines = ways[0]
@@ -118,7 +118,7 @@ def followed(
     yield best
     if not is_off_at_changes(time, (values - best.predicted(time)) / noise, lines.meets):
         return
-    slight = sum(map(is_slight, at_once.rates, at_once.rates[1:]))  # these may be part of the response to others
+    slight = sum(map(is_slight, at_once.rates, at_once.rates[1:]))  # slight ones may belong to a neighbour's response
     for kinks in reversed([one for one in ways if len(lines.meets) - len(one.meets) <= slight]):
         samples = _thinned(time, values, noise, kinks, kinks.far_levels(spacing), spacing)
         best = fit_pieces(samples, fit_at_once(samples, kinks.meets, np.zeros(len(kinks.meets))), spacing)
@@ -135,7 +135,7 @@ def _off(found: JointFit, at: Array, time: Array, values: Array, noise: float, s
 
 
 def _is_noise(off: Array) -> bool:
-    """True if the mean misfit of deviations (n,) is that of noise."""
+    """True if deviations (n,), in standard deviations of the noise, are no larger than noise alone would make them."""
     count = max(len(off), 1)
     return bool(OUTLIER**2 * np.sum(np.log1p((off / OUTLIER) ** 2)) / count <= 1 + LEFT / np.sqrt(count))
 

@@ -1,8 +1,8 @@
-"""Joint fit of all changes of rate of a displacement: lines, times, and the servo that follows the command.
+"""Joint fit of all changes of rate of a displacement: rates, times, and the response of the servo to its command.
 
-The displacement is c + v₀ t + Σ Δvᵢ S(t − tᵢ) + levels of the sensor. S is the travel after a unit step of the rate: at
-once, along a straight ramp, or late (`steadyslip.experiments.loading.servo`). If lines were fitted to the samples
-between changes only, parts of a slow response would be taken for rates and levels.
+The displacement is c + v₀ t + Σ Δvᵢ S(t − tᵢ) + levels of the sensor. S is the travel after a unit change of the rate:
+a step, a straight ramp, or the late response of a servo (`steadyslip.experiments.loading.servo`). If lines were fitted
+only to the samples between changes, parts of a slow response would be taken for rates and levels.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.loading import Pieces
 from steadyslip.experiments.loading.servo import DAMPINGS, late_response
 
-OUTLIER = 3.0  # samples weigh less from this number of standard deviations
-ROUNDS = 3  # rounds of weights in a linear fit, which only gives a starting point
-EVALUATIONS = 40  # most evaluations of one nonlinear fit; 10 to 20 are usual
+OUTLIER = 3.0  # samples that deviate by more than this number of standard deviations get less weight
+ROUNDS = 3  # times that a linear fit is repeated with new weights; few suffice, as it only gives a starting point
+EVALUATIONS = 40  # largest number of evaluations of one nonlinear fit; 10 to 20 are usual
 LAGS = 12  # number of lags from which a search starts, in geometric progression
 MOST = 0.9  # share of the deviations from steps that the first, coarse fit of a servo treats as noise
-REFINED = 10.0  # ratio of the noise assumed in successive fits
-OUTSIDE = 1e9  # deviation of all samples (standard deviations) if a change leaves the record, which rejects the step
-CHANGED = 1e-4  # relative step of lag and damping in numerical derivatives: errors of 1e-8, rounding of 1e-12
+REFINED = 10.0  # factor by which the assumed noise decreases from one fit to the next
+OUTSIDE = 1e9  # deviation (standard deviations) given to all samples if a change leaves the record: the fit avoids it
+CHANGED = 1e-4  # relative step of lag and damping in numerical derivatives: its error is 1e-8, that of rounding 1e-12
 
 
 _Responses = Callable[[Array, Array], tuple[Array, Array]]
 """Function of times and nonlinear parameters that returns travel (s) and rate after unit steps, each (n, changes)."""
 _Found = tuple[Array, Array, Array, float, Array]
-"""Nonlinear and linear parameters, deviations, misfit, covariance of the response's parameters."""
+"""Nonlinear and linear parameters, deviations, misfit, and covariance of lag and damping (empty without a servo)."""
 
 
 Shape = tuple[Array, list[Array]]
-"""Rates (changes + 1,), m/s, and shares of each change in its pieces."""
+"""Rates (changes + 1,) in m/s, and for each change the shares of it that its straight ramps make."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +60,10 @@ class JointFit:
     covariance : ndarray (2, 2)
         Covariance of the logarithms of lag and damping, for white noise unless `widened`; empty without a servo.
     pieces : tuple
-        Straight ramps of each change, if they were fitted: begin after its time (s), duration (s), share of the change.
+        For each change its straight ramps, if they were fitted: begin after the time of the change (s), duration (s),
+        share of the change.
     shapes : sequence of Shape
-        Rates and shares of the pieces one standard deviation from the fit, in independent directions.
+        Rates and shares of the ramps one standard deviation from the fit, in independent directions.
     """
 
     rates: Array
@@ -78,7 +79,7 @@ class JointFit:
     shapes: Sequence[Shape] = ()
 
     def widened(self, inflation: float) -> JointFit:
-        """Fit with errors for correlated noise, which has `inflation` samples per independent sample."""
+        """Copy with larger errors, for correlated noise that has `inflation` samples per independent sample."""
         wide = float(np.sqrt(inflation))
         own = [np.array([share for _, _, share in change]) for change in self.pieces]
         shapes = [
@@ -103,7 +104,7 @@ class JointFit:
 
 @dataclass(frozen=True, eq=False)
 class SensorSamples:
-    """Displacement to be fitted, some of it as means of samples.
+    """Displacement to be fitted: measured samples, or means of neighbouring samples.
 
     Attributes
     ----------
@@ -112,7 +113,7 @@ class SensorSamples:
     values : ndarray (n,)
         Displacement, m.
     worth : ndarray (n,)
-        Number of samples behind each value.
+        Number of samples of which each value is the mean.
     noise : float
         Standard deviation of a sample, m.
     levels : sequence of float
@@ -142,7 +143,7 @@ def fit_at_once(samples: SensorSamples, times: Array, durations: Array) -> Joint
 
 
 def fit_servo(samples: SensorSamples, step: JointFit, shortest: float, longest: float, gain: float) -> JointFit | None:
-    """Fit of steps that are followed late by one servo; None if it cannot be better than sudden steps by `gain`.
+    """Fit of steps to which one servo responds late; None if it cannot reduce the misfit of sudden steps by `gain`.
 
     Parameters
     ----------
@@ -152,7 +153,7 @@ def fit_servo(samples: SensorSamples, step: JointFit, shortest: float, longest: 
     shortest, longest : float
         Range of lags from which the search starts, s; the fitted lag may be down to a fifth of the shortest.
     gain : float
-        Least decrease of the misfit that a search is worth.
+        Decrease of the misfit below which a possible servo is not fitted.
     """
     noisy = _coarser(samples, step.deviations)
     starts = [one for one in _starts(noisy, step, shortest, longest) if one[0] > gain]
@@ -183,7 +184,7 @@ def _joint_fit(
     samples: SensorSamples, found: _Found, responses: _Responses, count: int, lag: float, damping: float,
     earlier: Array | float,
 ) -> JointFit:  # fmt: skip
-    """JointFit of `count` changes; their commands precede the fitted times by `earlier` (s)."""
+    """JointFit of `count` changes, made from a result `found`; commands precede the fitted times by `earlier` (s)."""
     x, linear, deviations, size, covariance = found
 
     def predicted(time: Array) -> Array:
@@ -194,16 +195,16 @@ def _joint_fit(
 
 
 def _coarser(samples: SensorSamples, deviations: Array) -> SensorSamples:
-    """Samples with the noise set so large that nearly all deviations from steps are within it.
+    """Samples with an assumed noise so large that it explains nearly all deviations from steps.
 
-    The misfit then has no local minima far from the best.
+    With this noise, the misfit has no local minima far from the best minimum.
     """
     size = float(np.quantile(np.abs(deviations), MOST)) / OUTLIER
     return replace(samples, noise=samples.noise * max(size, 1.0))
 
 
 def _refined(noisy: SensorSamples, samples: SensorSamples) -> Iterator[SensorSamples]:
-    """Samples with the noise of `noisy`, then ten times less and so on, down to their true noise."""
+    """Samples with the noise of `noisy`, then with ten times less and so on, last with the noise of `samples`."""
     noise = noisy.noise
     while noise > samples.noise * REFINED:
         yield replace(samples, noise=noise)
@@ -214,7 +215,7 @@ def _refined(noisy: SensorSamples, samples: SensorSamples) -> Iterator[SensorSam
 def _starts(
     samples: SensorSamples, step: JointFit, shortest: float, longest: float
 ) -> list[tuple[float, float, float]]:
-    """Gain over steps, lag and damping of possible servos, from a linear fit of each to the residuals of steps."""
+    """Decrease of the misfit of steps, lag and damping of possible servos, each from a linear fit to the residuals."""
     t, jumps = samples.time, np.diff(step.rates)
     moved, share = _at_once(t, step.times)
     base = np.linalg.qr(np.hstack([joint_columns(samples, moved), share]) / samples.scale[:, None])[0]
@@ -246,14 +247,14 @@ def ramp_responses(t: Array, begins: Array, durations: Array) -> tuple[Array, Ar
 
 
 def joint_columns(samples: SensorSamples, moved: Array) -> Array:
-    """Regressors (n, p) of the linear fit: constant, time, travel after each change, levels of the sensor."""
+    """Regressors (n, p) of the linear fit: constant, time, travel `moved` after each change, levels of the sensor."""
     t = samples.time
     levels = t[:, None] >= np.asarray(samples.levels, dtype=float)[None, :]
     return np.asarray(np.column_stack([np.ones(len(t)), t, moved, levels]))
 
 
 def _linear(samples: SensorSamples, moved: Array) -> tuple[Array, Array, float]:
-    """Coefficients (p,), deviations (n,) in standard deviations and misfit of a robust linear fit."""
+    """Coefficients (p,), residuals (n,) in standard deviations, and misfit of a robust linear fit."""
     columns = joint_columns(samples, moved) / samples.scale[:, None]
     values, weight = samples.values / samples.scale, np.ones(len(samples.time))
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
@@ -272,8 +273,8 @@ def misfit(deviations: Array) -> float:
 
 
 def _fitted(samples: SensorSamples, start: Array, responses: _Responses, extra: int = 0) -> _Found:
-    """Robust nonlinear fit of the times and of the response's parameters, which are the last `extra` of `start`."""
-    count, inside = len(start) - extra, samples.time[[1, -2]]  # beyond, a change would have no effect
+    """Robust nonlinear fit of the times and of the `extra` parameters of the response, which are last in `start`."""
+    count, inside = len(start) - extra, samples.time[[1, -2]]  # outside these times, a change would have no effect
     start = np.append(np.clip(start[:count], *inside), start[count:])
     known: list[tuple[Array, Array, Array, Array]] = []  # last response, kept for the derivatives at the same place
 

@@ -21,20 +21,20 @@ from steadyslip.experiments.numerics.smoothing import smoothing_curve
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise
 
 RAMP_GAIN = 40.0  # decrease of chi squared by which a ramp must fit better than a step; chosen by trial
-OUTLIER = 9.0  # samples weigh less from this squared deviation (in units of the noise): three standard deviations
+OUTLIER = 9.0  # samples whose squared deviation over the variance is larger get less weight: three standard deviations
 BRIEF = 0.1  # a sensor level with a smaller share of a run's samples may be the bottom of a glitch; chosen by trial
 AT_REST, STILL = 1e-3, 7e-4
-"""A run is a hold up to these shares of the highest rate and of the whole travel, as sensors drift in a hold; chosen by
-trial. A run at 1 um/s in a record with 1 mm/s is no hold."""
+"""A run is a hold if its rate is below the first share of the highest rate and its travel below the second share of the
+whole travel, as sensors drift in a hold; chosen by trial. A run at 1 um/s in a record with 1 mm/s is no hold."""
 SLOW = 0.02  # a run up to this share of the highest rate is a hold if 0 is within the error; chosen by trial
-MOST_CHANGES = 40  # most changes of a piecewise linear loading; chosen by trial
+MOST_CHANGES = 40  # largest number of changes in a piecewise linear loading; with more, a curve is used; by trial
 MOST_BETWEEN = 0.35  # largest share of the time between runs in a piecewise linear loading; chosen by trial
 ENOUGH_SAMPLES = 30  # least number of samples that determine their noise; chosen by trial
 BRIEF_RUN = 0.3  # a run shorter than this share of a neighbour may be part of a servo's response; chosen by trial
-MOST_BRIEF = 4  # most such runs that are left out, the shortest first: a record hardly has more
+MOST_BRIEF = 4  # largest number of brief runs that are left out, the shortest first: a record hardly has more
 LAG_ERROR = 0.1  # error in the time of a command that a servo follows, as a share of the lag
-SUDDEN = 5  # most samples of a glitch of the sensor, and samples on each side of a slip that show its size
-LASTING = 2.0  # runs are found again for correlated noise from this number of samples per independent sample
+SUDDEN = 5  # largest number of samples in a glitch; number of samples on each side of a slip that give its size
+LASTING = 2.0  # from this number of samples per independent sample, noise counts as correlated: runs are found again
 EXACTLY = 1e-9  # deviations below this share of a column's range are rounding
 EXACT = 1e-2  # a time is not fitted if its error is below this number of sampling intervals
 
@@ -42,9 +42,9 @@ EXACT = 1e-2  # a time is not fitted if its error is below this number of sampli
 def load_course(time: Array, displacement: Array, blurred: bool = False) -> Course:
     """Course of the load-point rate from a displacement: straight runs or, if these do not fit, a smooth curve.
 
-    `blurred` is true for a displacement that was integrated from a rate: it does not determine within a sampling
-    interval when the rate changed. If the displacement around changes is off the course, `otherwise` of the course is
-    a second one that follows it in pieces.
+    `blurred` is true for a displacement that was integrated from a rate: the time of a change is then uncertain by a
+    sampling interval. If the displacement around changes deviates from the course, its attribute `otherwise` is a
+    second course, in which each change is a series of straight ramps.
     """
     if not np.ptp(displacement) > 0:
         return Course(0.0)
@@ -85,9 +85,10 @@ class _Lines:
 
     @property
     def lasting(self) -> Array:
-        """Standard deviation (n,) of independent noise that hides as much as the noise around each sample, m.
+        """Standard deviation (n,), m, of white noise equivalent to the correlated noise around each sample.
 
-        It is the largest of a sample's run and the two neighbours, as a single run may not show the correlation.
+        The largest value of the run of a sample and its two neighbouring runs is used, because the samples of a single
+        run may not show the correlation.
         """
         own = np.array(self.strays) * np.sqrt(self.inflation)
         around = np.max([np.pad(own, 1)[k : k + len(own)] for k in range(3)], axis=0)
@@ -95,7 +96,7 @@ class _Lines:
         return np.asarray(around[np.searchsorted(middles, self.time)])
 
     def course(self, joint: JointFit | None, blurred: bool) -> Course:
-        """Course of steps and ramps or, with a joint fit, of changes that are followed late or in pieces."""
+        """Course of steps and ramps or, if `joint` is given, of the servo responses or series of ramps in that fit."""
         time, displacement, runs, kinks = self.time, self.displacement, self.runs, self.kinks
         rates = np.array([run.rate for run in runs]) if joint is None else joint.rates
         rest = _at_rest(rates, runs, self.errors, time, displacement)
@@ -132,7 +133,7 @@ def _at_rest(rates: Array, runs: list[Run], errors: list[float], time: Array, di
 
 
 def _without_brief(runs: list[Run], time: Array) -> Iterator[list[Run]]:
-    """All runs, then fewer and fewer: the shortest is left out each time, while it is brief beside a neighbour."""
+    """First all runs, then fewer: each time, the shortest run is left out if it is much shorter than a neighbour."""
     for _ in range(MOST_BRIEF + 1):
         yield runs
         lasts = [float(time[one.last - 1] - time[one.first]) for one in runs]
@@ -144,7 +145,7 @@ def _without_brief(runs: list[Run], time: Array) -> Iterator[list[Run]]:
 
 
 def _as_lines(time: Array, runs: list[Run]) -> Kinks:
-    """Changes between runs, as steps where the lines meet, with changes of the sensor's level and glitches."""
+    """Changes between runs as steps at the times where their lines meet; also sensor levels and glitches in runs."""
     pairs = list(pairwise(runs))
     meets = [
         np.clip((one.levels[-1] - other.levels[0]) / (other.rate - one.rate),
@@ -172,8 +173,8 @@ def _as_lines(time: Array, runs: list[Run]) -> Kinks:
 def slips_and_glitches(time: Array, displacement: Array) -> tuple[Array, Array]:
     """Regressors (k, n) that are 1 after each sudden change of a sensor's level, and mask (n,) of samples to keep.
 
-    Samples in a brief glitch are not kept. Changes of level that take many samples are not due to the sensor: the
-    machine yields at peaks of friction.
+    Samples in a brief glitch are not kept. A change of level that takes many samples is no slip of the sensor but a
+    deformation of the machine at a peak of friction.
     """
     runs = straight_runs(time, displacement)
     slips, keep = [], np.ones(len(time), dtype=bool)
@@ -203,8 +204,8 @@ def smooth_load(time: Array, displacement: Array) -> Course:
 def _errors(runs: list[Run], time: Array, displacement: Array) -> tuple[list[float], list[float], list[float]]:
     """Standard deviation from the line, error of the rate and samples per independent sample, for each run.
 
-    A run of few samples does not determine its noise; it gets that of the longest run. A run whose noise seems white
-    gets the correlation of the longest run, if that has correlated noise.
+    A run of few samples does not determine its noise and gets the noise of the longest run. A run whose noise seems
+    white gets the correlation of the longest run, if the noise of the longest run is correlated.
     """
     found = [_Scatter.of(run, time, displacement) for run in runs]
     longest = found[max(range(len(runs)), key=lambda k: len(runs[k].rows))]
@@ -221,7 +222,7 @@ def _errors(runs: list[Run], time: Array, displacement: Array) -> tuple[list[flo
 
 @dataclass(frozen=True, eq=False)
 class _Scatter:
-    """Scatter of a run about its line: standard deviation, noise model, weights (n,) of samples in the rate (1/s)."""
+    """Scatter of a run about its line: standard deviation, noise model, and derivatives (n,) of its rate by samples."""
 
     scale: float
     noise: Noise | None
@@ -251,12 +252,12 @@ class _Scatter:
         share = u / max(size, 1e-300)
         if not (scale > 1e-9 * max(float(np.ptp(displacement)), 1e-300) and size > 0):
             return cls(scale, None, share)
-        levels = (own == np.arange(len(count))[:, None]).astype(float)  # fitted levels and rate removed slow noise
+        levels = (own == np.arange(len(count))[:, None]).astype(float)  # the fit of levels and rate removed slow noise
         return cls(scale, describe(np.clip(r, -4 * scale, 4 * scale), rows=np.vstack([levels, u])), share)
 
 
 class _ChangeFit:
-    """Change between two runs: the meeting point of their lines, and a ramp or step there."""
+    """Change between two runs: the time at which their lines meet, and the step or ramp around this time."""
 
     def __init__(
         self, time: Array, displacement: Array, before: Run, after: Run, errors: tuple[float, float],
@@ -308,18 +309,18 @@ class _ChangeFit:
 
     @property
     def tells(self) -> bool:
-        """True if the samples around the change suffice to find how the load point follows it."""
+        """True if there are enough samples around the change to fit the response of the load point to it."""
         return len(self.time) >= ENOUGH_SAMPLES and self.reach > 0
 
     def late_change(
         self, at: float, before: float, after: float, lag: float, damping: float, pieces: Pieces = ()
     ) -> Change:
-        """Step at a time (s) that is followed late; its time is as uncertain as the meeting point of the lines."""
+        """Step commanded at the time `at` (s) with a late response; its error is that of the lines' meeting point."""
         half = 6 * self.deviation + self.spacing + LAG_ERROR * lag
         return Change(at, 0.0, before, after, at - half, at + half, lag=lag, damping=damping, pieces=pieces)
 
     def _uncertain_change(self, before: float, after: float, slack: float) -> Change:
-        """Step of uncertain time: the lines do not meet between the runs, due to a glitch or a slip of the sensor."""
+        """Step of uncertain time, for runs whose lines do not meet between them: the sensor had a glitch or slip."""
         first, last = self.zone
         length = last - first
         hidden = first - 2 * length - slack <= self.meet <= last + 2 * length + slack
@@ -331,7 +332,7 @@ class _ChangeFit:
 
     @cached_property
     def ramp(self) -> tuple[float, float, float]:
-        """Best duration (0 for a step), and the shortest and longest duration that fit nearly as well, s."""
+        """Best duration of a ramp (0 for a step), and shortest and longest duration that fit nearly as well, s."""
         if len(self.time) < 8 or not self.reach > 0:
             return 0.0, 0.0, 0.0
         grid = np.concatenate(
@@ -352,7 +353,7 @@ class _ChangeFit:
         return duration, 0.5 * min(float(ends[0]), duration), 1.5 * max(float(ends[1]), duration)  # for safety
 
     def _misfit(self, duration: float, outside: bool = True) -> float:
-        """Robust chi squared of a ramp between the two lines, over all samples or only those within the ramp."""
+        """Robust chi squared of a ramp between the two lines, of all samples or only of samples within the ramp."""
         begin = self.meet - 0.5 * duration
         first, last = np.searchsorted(self.time, begin, "right"), np.searchsorted(self.time, begin + duration)
         own = slice(first, max(first, last))
@@ -372,17 +373,17 @@ class _ChangeFit:
 
     @cached_property
     def _costs_of_lines(self) -> list[Array]:
-        """Chi squared (n + 1,) of the first 0 to n samples about the lines before and after the change."""
+        """Cumulative chi squared (n + 1,) of the first k samples, k = 0 to n, about each of the two lines."""
         return [np.append(0.0, np.cumsum(self._costs(self.displacement - line))) for line in self._lines]
 
     def _costs(self, deviations: Array) -> Array:
-        """Robust square of each deviation (n,) in units of the scatter; large deviations count less."""
+        """Robust squares (n,) of deviations (n,) in units of the scatter; large deviations have less weight."""
         scale = max(self.strays, 1e-9 * float(np.ptp(self.displacement)))
         return np.asarray(OUTLIER * np.log1p((deviations / scale) ** 2 / OUTLIER))
 
 
 def _levels(run: Run, edge: int) -> list[float]:
-    """Levels of the sensor at an end of a run (0 or -1): the outermost, and the next if the outermost lasts briefly."""
+    """Level of the sensor at the first (0) or last (-1) sample of a run, and the next level if the former is brief."""
     counts = np.bincount(np.repeat(run.groups, [j - i for i, j in run.members]))
     found = [float(run.levels[edge])]
     if len(counts) > 1 and counts[edge] < BRIEF * np.sum(counts):

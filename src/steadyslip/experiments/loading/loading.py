@@ -20,34 +20,34 @@ from steadyslip.experiments.loading.servo import ramps
 
 LoadCurve = Callable[[Array], Array]
 Pieces = tuple[tuple[float, float, float], ...]
-SLIGHT = 1.5  # changes of rate up to this ratio may be waviness of a sensor: commanded changes are larger
-FELT = 1e-6  # a smaller error of a level, relative to the highest level, has no effect on a fit
+SLIGHT = 1.5  # changes of rate by a smaller factor may be waviness of a sensor: commanded changes are larger
+FELT = 1e-6  # an error of a level that is smaller, relative to the highest level, has no effect on a fit
 
 
 def is_slight(before: float, after: float) -> bool:
-    """True if two positive rates (m/s) are so close that they may be the same."""
+    """True if two rates (m/s) are positive and so close that their difference may be an error of the sensor."""
     return bool(before > 0 < after and max(before, after) < SLIGHT * min(before, after))
 
 
 @dataclass(frozen=True)
 class Change:
-    """Change of a level: a step, a straight ramp, a step followed late by a servo, or a series of ramps.
+    """Change of a rate or pressure: a step, a straight ramp, a step with the late response of a servo, or many ramps.
 
     Attributes
     ----------
     time : float
-        Time at which it begins, s.
+        Time at which the change begins, s.
     duration : float
         Duration of a straight ramp, s; zero for a step.
     before, after : float
         Levels before and after the change: load-point rate (m/s) or pressure (Pa).
     earliest, latest : float
-        Range of possible times at which it begins, s; equal if the column determines the time.
+        Range of possible times at which the change begins, s; equal if the column determines the time.
     shortest, longest : float
-        Range of the duration, s. For a step: zero, and the longest ramp that fits as well.
+        Range of the duration, s. For a step: zero, and the duration of the longest ramp that fits as well.
     lag, damping : float
-        Lag (s) and damping ratio of a servo that follows a step late (see `steadyslip.experiments.loading.servo`);
-        `time` is then that of the command. Zero for a step or ramp.
+        Lag (s) and damping ratio of a servo that responds late to a step (see
+        `steadyslip.experiments.loading.servo`); `time` is then the time of the command. Zero for a step or ramp.
     pieces : tuple of (float, float, float)
         Straight ramps of a change that is neither a step, a ramp nor the response of a servo: begin after `time` (s),
         duration (s), share of the change; empty for other changes.
@@ -74,7 +74,7 @@ class Change:
 
     @property
     def free(self) -> bool:
-        """True if the column does not determine when the change begins."""
+        """True if the measured column does not determine the time at which the change begins."""
         return self.latest > self.earliest
 
     @property
@@ -84,7 +84,7 @@ class Change:
 
     @property
     def stretches(self) -> bool:
-        """True for a ramp whose duration the column does not determine."""
+        """True for a ramp whose duration the measured column does not determine."""
         return self.free and self.duration > 0
 
 
@@ -99,7 +99,7 @@ class Course(ReadOnly):
     changes : tuple of Change
         In order of time.
     errors : ndarray (changes + 1,)
-        Standard deviations of the levels, which are independent.
+        Standard deviations of the levels, whose errors are independent.
     curve : callable or None
         Function of time (s) added to the levels.
     strays : float
@@ -107,18 +107,18 @@ class Course(ReadOnly):
     slips : int
         Number of sudden changes of a displacement sensor's level that were left out.
     glitches : int
-        Number of other parts of the column that were left out.
+        Number of faulty parts of the column, other than slips, that were left out.
     early, late : int
         Number of samples at the beginning and at the end of the record that are off the course; they are too few to
         decide whether the sensor or the loading is the cause.
     servos : tuple of (float, float)
-        Lag (s) and damping ratio of servos one standard deviation from that of the changes, in independent directions.
+        Lag (s) and damping ratio one standard deviation from those of the changes, in independent directions.
     shapes : tuple of (ndarray (changes + 1,), sequence of ndarray)
         Levels, and shares of each change in its pieces, one standard deviation from those of the course in independent
         directions; if there are any, they include the errors of the levels.
     otherwise : Course or None
-        Second course whose changes consist of `pieces`, if the column around changes is off this course by more than
-        its noise: the load point may follow in its own way, or the sensor may have glitches.
+        Second course whose changes consist of `pieces`, if the column around changes deviates from this course by more
+        than its noise: the load point may respond neither at once nor as a servo, or the sensor may have glitches.
     """
 
     first: float
@@ -217,7 +217,7 @@ class Loading:
 
 
 def as_followed(loading: Loading, pieces: bool) -> Loading:
-    """Loading with one course of the load point: that in pieces if `pieces` is true and it exists, else the first."""
+    """Loading with one course of the load point: `otherwise` if `pieces` is true and it exists, else the first."""
     load = loading.load
     if load is None or load.otherwise is None:
         return loading
@@ -225,7 +225,7 @@ def as_followed(loading: Loading, pieces: bool) -> Loading:
 
 
 def with_reference(loading: Loading) -> Loading:
-    """Loading in which at least one change has a known time; if none has, that of the first step is fixed.
+    """Loading in which at least one change has a known time; if none has, the time of the first step is fixed.
 
     If all times were free, a lag of friction would have no effect, as all times could shift together.
     """
@@ -251,7 +251,7 @@ def resting_rate(loading: Loading) -> float | None:
 
 
 def _with_shares(change: Change, shares: Array) -> Change:
-    """Change with new shares (pieces,) of its pieces."""
+    """Copy of a change in which the ramps `pieces` make new shares (pieces,) of the change."""
     pieces = zip(change.pieces, shares.tolist(), strict=True)
     return replace(change, pieces=tuple((since, lasts, share) for (since, lasts, _), share in pieces))
 
@@ -264,7 +264,7 @@ def _with_levels(course: Course, levels: Array, changes: Sequence[Change]) -> Co
 
 
 def raised(course: Course) -> Iterator[Course]:
-    """Courses that each differ from a course by one standard deviation in one shape or level."""
+    """Copies of a course, each with one of its shapes or levels changed by one standard deviation."""
     levels = course.levels
     for others, shares in course.shapes:
         yield _with_levels(course, others, [_with_shares(*pair) for pair in zip(course.changes, shares, strict=True)])
@@ -276,9 +276,9 @@ def raised(course: Course) -> Iterator[Course]:
 
 
 def shifted(loading: Loading, pressed: bool) -> Iterator[Loading]:
-    """Loadings that each differ by one standard deviation in one level of pressure, or in the response of a servo.
+    """Copies of a loading, each with one level, shape or servo response changed by one standard deviation.
 
-    `pressed` includes the courses of normal stress and pore pressure.
+    If `pressed` is true, levels of normal stress and pore pressure are also changed.
     """
     for channel in ("load", "stress", "pore") if pressed else ("load",):
         course = getattr(loading, channel)

@@ -1,8 +1,8 @@
-"""Changes of rate as piecewise linear functions, for a load point that follows neither at once nor as a servo does.
+"""Changes of rate as piecewise linear functions, for a load point that responds neither at once nor as a servo does.
 
-This model is used if samples around changes are off the best steps, ramps or servo by more than their noise. The rate
-is constant between changes and free around them: linear between nodes that are dense at each change, and as smooth as
-cross-validation requires.
+This model is used if samples around changes deviate from the best steps, ramps or servo by more than their noise. The
+rate is constant between changes. Around a change it is linear between nodes, which are closest together at the change,
+and as smooth as cross-validation requires.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from steadyslip.experiments.loading.joint import (
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA
 
 BESIDE = 5.0
-"""Standard deviations by which a mean of samples near a change must be off. In 240 records of steps and servos with
-white and correlated noise none was off by more than 4.7; loads that creep, stick or have two time constants are off by
-11 and more."""
-ELSEWHERE = 1.3  # ratio by which such a mean must exceed all means of as many samples far from changes
+"""A fit fails if a mean of residuals near a change is off zero by more than this number of its standard deviations. In
+240 records of steps and servos with white and correlated noise no mean was off by more than 4.7; in records of load
+points that creep, stick or have two time constants, means are off by 11 and more."""
+ELSEWHERE = 1.3  # the mean must also exceed all means of as many residuals far from changes by this factor
 SHORTEST, WINDOWS = 4, 20  # samples of the shortest mean; number of means far from changes needed to know their scatter
-DENSE, GROWTH = 4, 1.25  # nodes one sampling interval apart on each side of a change; ratio of further distances
-SHARE = 0.45  # share of the time to the next change that may belong to a change: lines need the rest
-BEGUN = 0.05  # a change has begun when this share of it is done
+DENSE, GROWTH = 4, 1.25  # nodes one sampling interval apart on each side of a change; growth of the distances beyond
+SHARE = 0.45  # largest share of the time to the next change that a change may take: the rest determines the lines
+BEGUN = 0.05  # the time of a change is that at which this share of it is done
 COMPARED, EVEN = 25, 1e-9  # number of smoothing strengths compared, and ratio of the weakest to the strongest
-SINGULAR = 1e-12  # added to the unit diagonal, so that pieces without samples (lost ones) do not make it singular
+SINGULAR = 1e-12  # added to the unit diagonal of the normal matrix, which ramps without samples would make singular
 
 
 def is_off_at_changes(time: Array, off: Array, changes: Array) -> bool:
-    """True if a fit fails around changes: means of deviations there exceed their noise and the means far from changes.
+    """True if residuals around changes show that a fit fails: their means exceed the noise and means far from changes.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def fit_pieces(samples: SensorSamples, step: JointFit, spacing: float) -> JointF
 
 
 def _nodes(time: Array, changes: Array, spacing: float) -> list[Array]:
-    """Ends of the pieces (s) for each change."""
+    """Times (s), for each change, between which the rate is linear."""
     edges = np.concatenate([time[:1], changes, time[-1:]])
     steps = spacing * np.concatenate([np.ones(DENSE), GROWTH ** np.arange(1, 100)])
     found = []
@@ -124,10 +124,11 @@ def _nodes(time: Array, changes: Array, spacing: float) -> list[Array]:
 
 
 def _smoothest(rows: Array, values: Array, rough: Array) -> tuple[Array, Array]:
-    """Coefficients (p,) of a robust fit with roughness penalty by generalised cross-validation, and deviations (p, p).
+    """Coefficients (p,) of a robust fit with a roughness penalty, and their errors (p, p) in independent directions.
 
-    Each deviation is one standard deviation along an axis of the coefficients' posterior, with the penalty as prior
-    (Wahba 1983); the effect of noise alone would not include the error that smoothing causes.
+    Generalised cross-validation chooses the strength of the penalty. Each row of the errors is one standard deviation
+    along an axis of the posterior of the coefficients, with the penalty as prior (Wahba 1983): the effect of noise
+    alone would not include the error that smoothing causes.
     """
     weight, found, axes = np.ones(len(values)), np.zeros(rows.shape[1]), np.empty((0, rows.shape[1]))
     for _ in range(ROUNDS):

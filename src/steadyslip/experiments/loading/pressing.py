@@ -13,14 +13,15 @@ from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.numerics.smoothing import Smooth, smoothing_curve
 from steadyslip.experiments.numerics.splitting import FEWEST, level_noise, split
 
-LEAST_STRESS = 2e-3  # relative change of normal stress that counts as a change; chosen by trial
+LEAST_STRESS = 2e-3  # smallest relative change of normal stress that counts as a commanded change; chosen by trial
 OFF_LEVEL = 6.0  # a sample is off a level beyond this number of standard deviations
 SUDDEN, NEAR = 0.7, 3
-"""Least share of a change between means of samples before and after it, and number of samples in each; by trial."""
-CLIMB = 0.2  # a ramp's halves differ by more than this share of the rise: by .4 to .5; halves of a level by 0
-BINS = 40  # number of means of a span that are tested for being constant; chosen by trial
-UNEVEN = 3.0  # a span is not constant if the variance of its means is this multiple of that of noise; chosen by trial
-EARLIEST_STEP = 1e-6  # least time from a sample to a step after it, as a share of the sampling interval
+"""A change is sudden if the means of this number of samples (second) just before and after it differ by at least this
+share (first) of the change; chosen by trial."""
+CLIMB = 0.2  # samples climb if the means of their halves differ by more than this share of the rise; a ramp: 0.4 to 0.5
+BINS = 40  # number of means into which a span is divided to test whether it is constant; chosen by trial
+UNEVEN = 3.0  # a span is not constant if the variance of its means exceeds that of noise by this factor; by trial
+EARLIEST_STEP = 1e-6  # least time between a sample and a step after it, as a share of the sampling interval
 SLOW = 400  # knots of a curve between two changes: faster variation counts as noise; chosen by trial
 PER_PERIOD = 60  # knots per period of an oscillation; chosen by trial
 OSCILLATION = 8  # a stress oscillates from this number of sign changes; chosen by trial
@@ -68,7 +69,7 @@ def stress_course(time: Array, normal: Array) -> Course:
 
 
 def _deviates_alone(normal: Array) -> int:
-    """1 if the first sample is far from the next ones, which agree with each other; else 0."""
+    """1 if the first sample is far from the following samples, and these agree with each other; else 0."""
     if len(normal) < 4 * FEWEST:
         return 0
     following = normal[1 : 1 + FEWEST]
@@ -77,7 +78,7 @@ def _deviates_alone(normal: Array) -> int:
 
 
 def _transitions(time: Array, normal: Array, ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Samples at every change, as pairs: one past the last sample before it, and the first sample after it."""
+    """Index one past the last sample before a change, and index of the first sample after it, for every change."""
     levels = np.array([float(np.median(normal[i:j])) for i, j in ranges])
     for k, edge in ((0, slice(0, 2)), (-1, slice(-2, None))):  # the shortest range at an end may contain a change
         if ranges[k][1] - ranges[k][0] < 2 * FEWEST:
@@ -122,7 +123,7 @@ def _climbs(values: Array, rise: float) -> bool:
 def _between(
     normal: Array, one: tuple[int, int], other: tuple[int, int], before: float, after: float, noise: float
 ) -> tuple[int, int]:
-    """Range of samples between two ranges that are on neither of their levels."""
+    """Range of samples, between the ranges `one` and `other`, that have the level of neither range."""
     i, j = max(one[1] - FEWEST, one[0] + 1), min(other[0] + FEWEST, other[1] - 1)
     part = normal[i:j]
     away, there = np.abs(part - before) > OFF_LEVEL * noise, np.abs(part - after) <= OFF_LEVEL * noise
@@ -133,7 +134,7 @@ def _between(
 
 
 def _sudden(normal: Array, pair: tuple[int, int], apart: float) -> bool:
-    """True if most of the change happens between the samples `pair`, rather than slowly on both sides."""
+    """True if most of the change `apart` happens between the samples `pair`, and not gradually before and after."""
     last, first = pair
     before, after = normal[max(last - NEAR, 0) : last], normal[first : first + NEAR]
     return bool(len(before) and len(after) and abs(np.mean(after) - np.mean(before)) > SUDDEN * apart)
@@ -150,7 +151,7 @@ def _straight(time: Array, normal: Array, pair: tuple[int, int], noise: float) -
 
 
 def _whole_ramp(time: Array, pair: tuple[int, int], change: Change) -> tuple[int, int]:
-    """Range of all samples of a change; for a long ramp, extended to where its line meets the levels."""
+    """Range of all samples of a change; a long ramp is extended to the times at which its line meets the levels."""
     last, first = pair
     if first - last < FEWEST:
         return pair
@@ -162,7 +163,7 @@ def _change(time: Array, normal: Array, last: int, first: int, levels: list[floa
     """Change between two samples: a step if they are neighbours, or the ramp through the samples between them."""
     before, after = levels
     early, late = float(time[last]), float(time[first])
-    if first == last + 1:  # begins after the earlier sample, because friction jumps with the stress
+    if first == last + 1:  # a step begins after the earlier sample, because friction jumps with the stress
         return Change(0.5 * (early + late), 0.0, before, after, early + EARLIEST_STEP * (late - early), late, 0.0, 0.0)
     t, s = time[last + 1 : first], normal[last + 1 : first]
     if len(t) == 1:
@@ -243,7 +244,7 @@ class LoadStep:
         ``velocity step``, ``hold``, ``reslide``, ``normal-stress step``, ``normal-stress oscillation`` or
         ``pore-pressure step``.
     time : float
-        Time at which it begins, s.
+        Time at which the change begins, s.
     duration : float
         Duration, s; zero for a sudden change. For an oscillation: its period.
     before, after : float
@@ -273,7 +274,7 @@ class LoadStep:
 
 
 def steps_of(loading: Loading, wave: StressWave | None) -> tuple[LoadStep, ...]:
-    """Changes of a loading and its oscillation, in order of time."""
+    """Changes of a loading, and its oscillation of normal stress if there is one, in order of time."""
     found = [_step(channel, change) for channel, _, change in loading.changes]
     if wave is not None:
         found.append(LoadStep("normal-stress oscillation", wave.time, wave.period, wave.mean, wave.amplitude))

@@ -16,24 +16,24 @@ from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import reversed_column, run_at_start
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise, ranges_of_means, split, typical
 
-RATE_SIGMAS = 4.0  # standard errors by which two rates must differ
-LIKE = 0.02  # relative difference of rates that counts as none; chosen by trial
-LEAST_CHANGE = 0.05  # relative change of rate that counts as a change; chosen by trial
+RATE_SIGMAS = 4.0  # two rates are different if they differ by more than this number of standard errors
+LIKE = 0.02  # two rates are equal if their relative difference is smaller; chosen by trial
+LEAST_CHANGE = 0.05  # smallest relative change of rate that counts as a change; chosen by trial
 BACK = 5.0  # a displacement is back on a line within this number of standard errors
 LONGEST_GLITCH = 0.2  # longest glitch, as a share of the record's time and of its travel; chosen by trial
 CHANGE = 3.0  # cost of a change of rate, in units of a misfit of `RATE_SIGMAS` standard errors; chosen by trial
 FRAGMENT = 0.1  # cost of leaving out a piece, in addition to the cost of its length; chosen by trial
 SHORTEST = 0.05  # leaving out this share of the record (time or travel) costs as much as a change; chosen by trial
 SLIP = 0.01  # longest slip of the sensor, as a share of the record's time; chosen by trial
-MAIN = 0.6  # least share of the samples left out between two pieces that form a separate run; chosen by trial
-LEAD = 8.0  # least travel by which rates differ over a run, in standard deviations of the noise; chosen by trial
+MAIN = 0.6  # of the samples left out between two pieces, at least this share must be in a separate run; by trial
+LEAD = 8.0  # two runs differ if their rates make this difference of travel, in standard deviations of noise; by trial
 STRAIGHT = 20  # a short part with this number of samples on a line is no slip of the sensor, which is sudden
-PLAIN = 100.0  # travel by which rates differ that makes a piece of any length a separate run; chosen by trial
-RELIABLE, FEWEST = 8, 5  # least number of samples of such a piece: within a run, at an end of the record; by trial
+PLAIN = 100.0  # a difference of travel, in the same unit, with which a piece of any length is a separate run; by trial
+RELIABLE, FEWEST = 8, 5  # least number of samples of a separate run: within a run, at an end of the record; by trial
 HELD, FLAT = 20.0, 4
 """Least distance between the lines before and after a brief hold, in standard deviations of the noise; least number of
-samples at rest in it."""
-COARSE = 20_000  # above this number of samples, means are segmented instead, to limit the time; chosen by trial
+samples at rest in the hold."""
+COARSE = 20_000  # of longer records, means of neighbouring samples are segmented, to limit the time; chosen by trial
 
 
 @dataclass
@@ -47,9 +47,9 @@ class Run:
     rate : float
         m/s.
     groups : list of int
-        Index in `levels` of each member; it grows by 1 at each slip of the sensor.
+        Index in `levels` of each member; the index grows by 1 at each slip of the sensor.
     levels : ndarray (groups,)
-        Displacement of the line of each sensor level at the first time of the record, m.
+        For each level of the sensor, displacement (m) at which its line meets the first time of the record.
     """
 
     members: list[tuple[int, int]]
@@ -63,7 +63,7 @@ class Run:
 
     @property
     def last(self) -> int:
-        """One past the last sample."""
+        """Index one past the last sample of the run."""
         return self.members[-1][1]
 
     @property
@@ -71,7 +71,7 @@ class Run:
         return np.concatenate([np.arange(i, j) for i, j in self.members])
 
     def reversed(self, time: Array) -> Run:
-        """Same run as found in the record reversed in time and sign (see `ends.reversed_column`)."""
+        """This run, described in the record reversed in time and sign (see `ends.reversed_column`)."""
         count, span = len(time), float(time[-1] - time[0])
         members = [(count - j, count - i) for i, j in reversed(self.members)]
         groups = [self.groups[-1] - group for group in reversed(self.groups)]
@@ -106,15 +106,15 @@ class _Pieces:
 
 
 def straight_runs(time: Array, displacement: Array, lasting: Array | None = None) -> list[Run]:
-    """Straight runs of a displacement, in order of time; neighbours differ in rate.
+    """Straight runs of a displacement, in order of time; neighbouring runs have different rates.
 
     Parameters
     ----------
     time, displacement : ndarray (n,)
         s, m.
     lasting : ndarray (n,), optional
-        Standard deviation (m) of independent noise, at each sample, that would hide as much as the correlated noise of
-        the sensor. It is needed because differences of neighbouring samples show correlated noise only in part.
+        Standard deviation (m), at each sample, of white noise equivalent to the correlated noise of the sensor. It is
+        needed because differences of neighbouring samples show correlated noise only in part.
     """
     lasting = np.zeros(len(time)) if lasting is None else lasting
     step = -(-len(time) // COARSE)
@@ -148,9 +148,9 @@ def _runs_of(time: Array, displacement: Array, lasting: Array) -> list[Run]:
 
 
 def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: Array, lasting: Array) -> list[Run]:
-    """Runs with further runs of a few samples before the first and after the last, if these determine a rate.
+    """Runs, with a further run before the first and after the last if a few samples there determine another rate.
 
-    A very short run at an end is removed and examined again, because its ranges may contain a change of rate.
+    A very short first or last run is removed and its samples examined again, as they may contain a change of rate.
     """
     found, count = list(runs), len(time)
     if len(found) > 1 and found[0].last <= RELIABLE:
@@ -171,7 +171,7 @@ def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: Array, 
 
 
 def _with_exact_boundaries(runs: list[Run], step: int, time: Array, displacement: Array, lasting: Array) -> list[Run]:
-    """Runs found on means of `step` samples, with each boundary moved to the sample where the lines meet."""
+    """Runs that were found on means of `step` samples, with each boundary moved to the sample where the lines meet."""
     runs = [fitted_run(run, time, displacement, lasting) for run in runs]
     for before, after in pairwise(runs):
         if before.last != after.first or before.rate == after.rate:
@@ -238,7 +238,7 @@ def _joined_across_flanks(
 
 
 def _is_continued(before: Run, middle: Run, after: Run, time: Array, noise: Array) -> bool:
-    """True if two runs are on one line and the run between them is short."""
+    """True if the runs `before` and `after` are on one line and the run `middle` between them is short."""
     if time[middle.last - 1] - time[middle.first] > LONGEST_GLITCH * (time[-1] - time[0]):
         return False
     at, errors, lines = 0.5 * (time[middle.first] + time[middle.last - 1]), [], []
@@ -255,10 +255,10 @@ def _is_continued(before: Run, middle: Run, after: Run, time: Array, noise: Arra
 
 
 def _segmented(pieces: _Pieces) -> list[list[int]]:
-    """Indices of the pieces of each run, by the segmentation of least cost.
+    """Indices of the pieces that form each run, in the segmentation of least cost.
 
     A piece either has the rate of its run within its error, or is left out at a cost that grows with its length; each
-    change of rate also has a cost. Dynamic programming finds the optimum over the rates of all pieces.
+    change of rate also has a cost. The rate of a run is that of one of the pieces; dynamic programming finds the best.
     """
     count = len(pieces.ends)
     error = np.hypot(pieces.slope_error, LIKE / RATE_SIGMAS * np.abs(pieces.slope))
@@ -291,7 +291,7 @@ def _segmented(pieces: _Pieces) -> list[list[int]]:
 
 
 def _with_holds(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
-    """Indices of the pieces of each run, after separation of pieces that leave a run's line for good (short holds)."""
+    """Indices of the pieces of each run; pieces that leave a run's line for good (short holds) become runs."""
     found = []
     for members in groups:
         rate, _ = _mean_slope(members, pieces)
@@ -309,9 +309,10 @@ def _with_holds(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
 
 
 def _separate_run(inner: Array, rate: float, gap: float | None, pieces: _Pieces) -> list[int]:
-    """Indices of pieces, among the pieces `inner` left out of a run, that form a separate run; empty if none do.
+    """Indices of the pieces, among the pieces `inner` left out of a run, that form a separate run; empty if none do.
 
-    A short `gap` (s) within a run is a slip of the sensor. At an end of the record, the gap is None.
+    If the `gap` (s) that these pieces leave in a run is short, they are taken for a slip of the sensor. At an end of
+    the record, the gap is None.
     """
     if not len(inner):
         return []
@@ -321,7 +322,7 @@ def _separate_run(inner: Array, rate: float, gap: float | None, pieces: _Pieces)
     like = RATE_SIGMAS * np.hypot(pieces.slope_error[inner], error) + LIKE * np.maximum(abs(slope), abs(rate))
     main = inner[np.abs(pieces.slope[inner] - slope) <= like]
     usual = typical(pieces.usual[inner])
-    lasting = abs(np.sum(away)) > max(LEAD * usual, 0.7 * float(np.sum(np.abs(away))))  # not back again
+    lasting = abs(np.sum(away)) > max(LEAD * usual, 0.7 * float(np.sum(np.abs(away))))  # does not return to the line
     whole = np.sum(pieces.size[main]) > MAIN * np.sum(pieces.size[inner]) and np.sum(pieces.size[main]) >= (
         RELIABLE if gap is not None else FEWEST
     )
@@ -333,7 +334,7 @@ def _separate_run(inner: Array, rate: float, gap: float | None, pieces: _Pieces)
 
 
 def _without_glitches(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
-    """Runs without parts of glitches: excursions that return, or that are off the lines of both neighbours."""
+    """Runs without glitches: excursions that return to the line, or that are off the lines of both neighbours."""
     groups = list(groups)
     i = 0
     while i < len(groups) - 2:
@@ -394,7 +395,7 @@ def _joined_by_rate(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]
 
 
 def _joined_across_wander(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
-    """Runs after joining those that differ by less than slow wander of the displacement, the least different first."""
+    """Runs after joining neighbours that differ no more than slow drift of the sensor would make them differ."""
     groups = list(groups)
     while len(groups) > 1:
         slopes = np.array([_mean_slope(members, pieces)[0] for members in groups])
@@ -410,10 +411,10 @@ def _joined_across_wander(groups: list[list[int]], pieces: _Pieces) -> list[list
 
 
 def fitted_run(run: Run, time: Array, displacement: Array, lasting: Array | None = None) -> Run:
-    """Run with its rate and sensor levels from a robust line; members that agree are given the same level.
+    """Run with its rate and sensor levels from a robust line fit; members whose levels agree get the same level.
 
-    Levels differ if their difference exceeds its error, from the scatter of the samples or from `lasting` (see
-    `straight_runs`) if that is larger.
+    Levels are different if their difference exceeds its error. The error is computed from the scatter of the samples,
+    or from `lasting` (see `straight_runs`) if that is larger.
     """
     lasting = np.zeros(1) if lasting is None else lasting[run.rows]
     groups = list(range(len(run.members)))
@@ -435,7 +436,7 @@ def fitted_run(run: Run, time: Array, displacement: Array, lasting: Array | None
 def _robust_line(
     run: Run, groups: list[int], time: Array, displacement: Array, lasting: Array
 ) -> tuple[float, Array, Array, Array, float]:
-    """Rate, levels, their mean times and errors, and error of the rate, from a line with low weight of outliers."""
+    """Rate, levels, mean time and error of each level, and error of the rate, from a line robust against outliers."""
     rows = run.rows
     own = np.repeat(groups, [j - i for i, j in run.members])
     t, x = time[rows] - time[0], displacement[rows]

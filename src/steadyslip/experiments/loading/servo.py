@@ -1,9 +1,9 @@
-"""Response of a servo to a step of the commanded rate: it follows late, and may overshoot.
+"""Response of a servo to a step of the commanded rate: it is late, and may overshoot.
 
-The rate of the load point responds as a second-order system with poles s₁, s₂: a time t after the command, it has made
-the share g(t) = 1 − (s₂ exp(s₁ t) − s₁ exp(s₂ t)) / (s₂ − s₁) of the step. Long after the step, the load point is
-behind the command by the step times `lag` = 2 ζ/ω, so that the lines through its displacement before and after the step
-meet a time `lag` after the command.
+The rate of the load point responds as a second-order system with poles s₁, s₂: a time t after the command, the rate has
+changed by the share g(t) = 1 − (s₂ exp(s₁ t) − s₁ exp(s₂ t)) / (s₂ − s₁) of the step. Long after the step, the load
+point is behind the command by the step times `lag` = 2 ζ/ω, so that the lines through its displacement before and after
+the step meet a time `lag` after the command. ω is the natural angular frequency and ζ the damping ratio.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ DAMPINGS = (0.2, 0.35, 0.6, 1.05, 2.0, 8.0)
 GAIN = 8.0
 """Decrease of chi squared by which a servo must fit better than steps or ramps. In 670 records without a servo, with
 white or correlated noise, the largest decrease was 9.4, the next 7.4."""
-SETTLED = 1e-3  # a step is complete when this share of it is left
+SETTLED = 1e-3  # a step counts as complete when the rate is within this share of the step of its final value
 PIECES = 24  # number of straight ramps that approximate a response: its rate is then right to 1 % of the step
 
 
@@ -31,9 +31,10 @@ def _poles(lag: float, damping: float) -> tuple[complex, complex]:
 
 
 def late_response(since: Array, lag: float, damping: float) -> tuple[Array, Array]:
-    """Displacement (s) and rate of a servo at times `since` (s) after the command of a unit step of the rate.
+    """Response of a servo to a unit step of the commanded rate, `since` seconds after it: displacement and rate.
 
-    They solve x'' + 2 ζ ω x' + ω² (x - t) = 0 from rest, with ω = 2 ζ/lag.
+    The displacement is in seconds, as the rate has no unit. It solves x'' + 2 ζ ω x' + ω² (x - t) = 0 from rest, with
+    ω = 2 ζ/lag.
     """
     one, other = _poles(lag, damping)
     t = np.maximum(since, 0.0)
@@ -48,7 +49,7 @@ def late_response(since: Array, lag: float, damping: float) -> tuple[Array, Arra
 
 
 def settling(lag: float, damping: float) -> float:
-    """Time (s) after the command at which all but a share `SETTLED` of a step is done."""
+    """Time (s) after the command from which the rate is within about a share `SETTLED` of its final value."""
     return float(-np.log(SETTLED) / min(-pole.real for pole in _poles(lag, damping)))
 
 

@@ -12,22 +12,24 @@ from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen
 GAP = 10.0  # an interval is noted as a gap from this multiple of the usual spacing; chosen by trial
 RESTART = 0.02  # the clock restarted if more than this share of consecutive rows has times before the latest; by trial
 COARSE, EVEN = 0.6, 1.25
-"""Share of distinct times below which a clock may be coarse; largest range of times about even ones, in clock ticks."""
+"""A clock may be coarser than the sampling if a smaller share of the rows (first number) has distinct times, and if the
+range of times minus evenly spaced times is smaller than the second number, in ticks of the clock."""
 AROUND = 25  # the usual spacing is the mean over this many rows on each side; chosen by trial
-LARGEST_NUMBER = 1e60  # largest SI number allowed: squares and ratios then stay within floating point
+LARGEST_NUMBER = 1e60  # largest number allowed in SI units: squares and ratios then stay within double precision
 ASSUMED = "(assumed; give area)"  # in the note on a force without an area: its stress is then meaningless
-PLAUSIBLE = (1e-3, 10.0)  # range of friction coefficients: outside it, a unit is wrong
+PLAUSIBLE = (1e-3, 10.0)  # plausible friction coefficients: outside this range, the unit of a stress is wrong
 USUAL = {
     "the load point moves at": ("m/s", (5e-9, 1e-3), "displacement and time in the units stated (um, s)"),
     "the load point moves": ("m", (0.0, 0.1), "displacements in the unit stated (um, not mm)"),
     "samples come every": ("s", (5e-5, 10.0), "times in the unit stated (s, not ms)"),
     "the normal stress is": ("Pa", (2e5, 2e9), "stresses in the unit stated (MPa, not kPa)"),
 }
-"""Unit, usual range and advice for the mean of each quantity in a laboratory: a factor of 1000 is mostly noticed."""
+"""Unit, usual range of the mean in a laboratory, and advice, for each quantity; most errors by 1000 are noticed."""
 PLACEHOLDERS = (999.0, 999.25, 9999.0, 9999.25, 99999.0, 999999.0, 1e20, 1e30, 9.9e37, 9.91e37, 9.969209968386869e36)
 """Placeholders, of either sign, that instruments and programs write for missing values."""
 PLACEHOLDER_RATIO = 4.0
-"""Least ratio of a placeholder to the largest other number; not needed if its sign is unique; chosen by trial."""
+"""Least ratio of a placeholder to the largest other number of its column; chosen by trial. A placeholder whose sign no
+other number has may be smaller."""
 PLACEHOLDER_TOLERANCE = 1e-6  # relative difference from a placeholder: single precision, and rounding when printed
 MOST_PLACEHOLDERS = 0.2  # a number that makes up a larger share of its column was measured; chosen by trial
 
@@ -143,7 +145,7 @@ def _without_gaps_in_rows(si: dict[str, Array], lines: Array, notes: list[str]) 
 
 
 def _in_order(si: dict[str, Array], lines: Array, notes: list[str], source: str) -> tuple[dict[str, Array], Array]:
-    """Rows without those whose time goes back, and with rows of equal time separated (see `_separated_times`)."""
+    """Rows in order of time, without rows earlier than a row before them; equal times are separated."""
     time = si["time"]
     high = np.maximum.accumulate(time)
     back = time < high
@@ -171,7 +173,7 @@ def _check_clock(time: Array, high: Array, back: Array, lines: Array, source: st
 
 
 def _even_times(time: Array) -> Array | None:
-    """Evenly spaced times for rows stamped by a clock coarser than the sampling; None if they do not fit."""
+    """Evenly spaced times in place of times from a clock coarser than the sampling; None if the rows are not even."""
     rows = np.arange(len(time), dtype=float)
     tick = float(np.min(np.diff(np.unique(time))))
     slope, origin = np.polyfit(rows, time, 1)
@@ -184,14 +186,14 @@ def _even_times(time: Array) -> Array | None:
 def _separated_times(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
     """Rows with distinct times; rows of equal time come from a clock coarser than the sampling, or are duplicates.
 
-    A group of rows of equal time is spread evenly up to the next time, if it has as many rows as fit there at the usual
-    spacing. Any other group becomes one row, its mean, because different times for its rows would be invented.
+    Rows of equal time are spread evenly up to the next time, if their number fits there at the usual spacing. Otherwise
+    they are replaced by their mean, because different times for them would be invented.
     """
     time = si["time"]
     unique, first, counts = np.unique(time, return_index=True, return_counts=True)
     if len(unique) == len(time):
         return si, lines
-    uneven = len(unique) < COARSE * len(time) and np.ptp(counts[1:-1]) > 0  # groups of equal size are spread exactly
+    uneven = len(unique) < COARSE * len(time) and np.ptp(counts[1:-1]) > 0  # groups of equal size are spread below
     if uneven and (even := _even_times(time)) is not None:
         notes.append(
             f"the clock is coarser than the sampling ({len(unique)} times for {len(time)} rows); rows taken as even, "
@@ -221,7 +223,7 @@ def _separated_times(si: dict[str, Array], lines: Array, notes: list[str]) -> tu
 
 
 def _local_median(spacing: Array) -> Array:
-    """Median spacing in blocks of 51 intervals, so that a change of sampling rate is not a series of gaps."""
+    """Median spacing in blocks of 51 intervals, so that a lower sampling rate is not taken for a series of gaps."""
     block = 51  # intervals; chosen by trial
     if len(spacing) < 2 * block:
         return np.full(len(spacing), np.median(spacing))
@@ -247,7 +249,7 @@ def _check_sizes(si: dict[str, Array], source: str, lines: Array) -> None:
 
 
 def _in_compression(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
-    """Change the sign of a normal stress that is negative throughout (compression counted as negative)."""
+    """Columns with the sign of the normal stress changed, if it is negative throughout (negative compression)."""
     if "normal" not in si or not np.all(si["normal"] < 0):
         return si
     notes.append("normal stress is negative throughout: taken as compression, its sign changed")
@@ -255,7 +257,7 @@ def _in_compression(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
 
 
 def _effective(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
-    """Effective normal stress in place of the total one where the pore pressure was measured."""
+    """Columns with the effective in place of the total normal stress, if the pore pressure was measured."""
     if "pore_pressure" not in si:
         return si
     if "normal" not in si:
@@ -266,7 +268,7 @@ def _effective(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
 
 
 def _turned_forwards(si: dict[str, Array], notes: list[str]) -> dict[str, Array]:
-    """Change signs so that the load point moves forwards and friction is positive."""
+    """Columns with signs changed, if needed, so that the load point moves forwards and friction is positive."""
     moved = si.get("displacement")
     back = moved is not None and moved[0] - moved[-1] > 0.5 * float(np.ptp(moved))
     resists = float(np.median(si["friction"])) > 0
@@ -291,7 +293,7 @@ def _check_stress(si: dict[str, Array], source: str, lines: Array) -> None:
 
 
 def _unusual(si: dict[str, Array], forces: bool) -> list[str]:
-    """Notes on columns with an unusual mean, which often means that a unit is wrong."""
+    """Notes on columns whose mean is unusual, often because a unit is wrong."""
     time, travel = si["time"], float(np.ptp(si.get("displacement", 0.0)))
     normal = 0.0 if forces else float(np.mean(si.get("normal", 0.0)))
     means = (travel / float(np.ptp(time)), travel, float(np.median(np.diff(time))), normal)

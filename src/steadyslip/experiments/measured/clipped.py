@@ -11,23 +11,23 @@ from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.splitting import level_noise, spread
 
 SHORTEST = 3  # least number of equal samples in a row that count as cut off
-CHANCE = 1e-6  # probability of such a run by chance, from how often neighbouring samples of the record are equal
-GAP = 5  # runs closer than this many samples are one peak: noise brings the channel below its limit for a moment
+CHANCE = 1e-6  # largest probability that a run of equal samples occurs in the record by chance
+GAP = 5  # runs at most this many samples apart are one peak: noise brings the channel below its limit for a moment
 PLATEAU, QUIET = 10, 0.3
-"""Least number of samples of a plateau, and its largest noise as a share of the record's noise. A random walk, or white
-noise about a peak, stays so close to its largest value for so long once in 1e7 cases."""
+"""Least number of samples of a plateau, and largest noise on it as a share of the record's noise. A random walk, or
+white noise about a peak, has a plateau that long and that quiet once in 1e7 cases."""
 STILL = 1e-3  # a channel stands still if it changes by less than this share of its median change between samples
 CLIPPED = "at a limit of the channel"
 BESIDE = 2  # neighbours on each side with which a sample is compared
 WILD_SIZE, WILD_RANGE = 20.0, 4.0
-"""Least distance of a wild sample from the median of its neighbours: in standard deviations of the noise (as
-`OUTLIER_SIZE`), and in ranges of the neighbours, which are wide at a true peak of friction."""
+"""A sample is faulty if it is further from the median of its neighbours than both limits: the first in standard
+deviations of the noise (as `OUTLIER_SIZE`), the second in ranges of the neighbours, as these differ at a true peak."""
 AFTER = 4  # samples after a change of the loading in which friction may have a peak of a single sample
-LARGEST_DIRECT = 0.05  # largest height of such a peak per e-fold of rate: twice the largest direct effect of rocks
+LARGEST_DIRECT = 0.05  # largest height of a true peak after a rate change by a factor e: twice the direct effect `a`
 WILD = "far off the samples beside"
 OFF_FIT = "so far off the fit that half of its misfit and more was there"
-OUTLIER_SIZE = 20.0  # least size of an outlier, in rms of the other residuals
-MAX_OUTLIERS = 2e-3  # largest share of outliers in a record; more of them have a common cause
+OUTLIER_SIZE = 20.0  # smallest residual of an outlier, in root mean squares of the other residuals
+MAX_OUTLIERS = 2e-3  # largest share of samples that may be outliers; more of them have a common cause
 
 
 def without_clipped(record: Record) -> Record:
@@ -61,7 +61,7 @@ def without_wild(record: Record) -> Record:
 
 
 def without_outliers(record: Record, residuals: Array) -> Record:
-    """Record without outliers: the few samples, if any, that make half of the sum of squares of `residuals` (n,)."""
+    """Record without outliers: few samples with half of the sum of squares of `residuals` (n,), if there are such."""
     squares = residuals**2
     order = np.argsort(-squares)
     gone = np.cumsum(squares[order])
@@ -74,7 +74,7 @@ def without_outliers(record: Record, residuals: Array) -> Record:
 
 
 def _without(record: Record, out: Array, why: str) -> Record:
-    """Record without the samples where the mask `out` (n,) is true, with a note; keeps the loading found in all."""
+    """Record without the samples for which the mask `out` (n,) is true, with a note; its loading remains the same."""
     if not np.any(out):
         return record
     first, last = record.time[out][[0, -1]]
@@ -93,7 +93,7 @@ def _off_neighbours(values: Array) -> tuple[Array, Array]:
 
 
 def clipped(values: Array) -> Array:
-    """Mask (n,) of samples at an upper limit of the channel: runs of the largest value that are too long for chance."""
+    """Mask (n,) of samples at an upper limit of the channel: the largest value repeated more often than by chance."""
     found = np.zeros(len(values), dtype=bool)
     top = np.flatnonzero(values == np.max(values))
     if len(top) < SHORTEST:
@@ -129,7 +129,7 @@ def flattened(values: Array) -> Array:
 
 
 def _is_cut_off(values: Array, peak: Array) -> bool:
-    """True if the values reach and leave a peak abruptly; friction that approaches steady sliding does not."""
+    """True if values (n,) reach and leave a peak abruptly, unlike friction that approaches steady sliding."""
     if peak[0] == 0 or peak[-1] == len(values) - 1:
         return False
     moved = np.abs(np.diff(values))

@@ -22,7 +22,7 @@ ROLES = {
 }
 """Roles of columns, with SI units; displacement and velocity are those of the load point."""
 
-MOST_LISTED = 40  # names in a message; more would not be read
+MOST_LISTED = 40  # largest number of names in a message: more would not be read
 
 _WORDS = {
     "s": ("sec", "secs", "second", "seconds"),
@@ -75,14 +75,14 @@ class Column:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names joined for a message, at most `MOST_LISTED`."""
+    """Text for a message with the first `MOST_LISTED` names, and the number of names left out."""
     every = list(names)
     more = [f"and {len(every) - MOST_LISTED} more"] if len(every) > MOST_LISTED else []
     return ", ".join([*every[:MOST_LISTED], *more])
 
 
 def split_name(name: str) -> tuple[str, str | None]:
-    """Name of a column without its unit, and the unit in it or None.
+    """Name of a column without the unit that it contains, and that unit, or None if it contains none.
 
     >>> split_name("Normal_stress(MPa)"), split_name("lp_disp_um"), split_name("t/s"), split_name("Friction")
     (('Normal_stress', 'MPa'), ('lp_disp', 'um'), ('t', 's'), ('Friction', None))
@@ -105,7 +105,7 @@ def split_name(name: str) -> tuple[str, str | None]:
 
 
 def known_unit(text: str) -> str | None:
-    """Unit in the spelling of this package, such as um for microns; None if `text` is no unit."""
+    """Unit that `text` names, in the spelling of this package, such as um for microns; None if it is no unit."""
     text = text.strip()
     spelled = _SPELLINGS.get(text.lower(), text)
     if not spelled:
@@ -151,14 +151,14 @@ def guess_role(name: str, has_unit: str | None) -> str | None:
 def assign_columns(
     names: Sequence[str], given: Mapping[str, Any], file_units: Sequence[str | None]
 ) -> tuple[dict[str, Column], list[Problem], list[str]]:
-    """Column of every role, from the user's options or else from the names of columns.
+    """Column of the file for each role, from the user's options or else from the names of columns.
 
     Parameters
     ----------
     names : sequence of str
         Names of the file's columns.
     given : mapping of str to Any
-        By role: name or number (from 1) of a column, a unit, or a pair of both.
+        For each role, name or number (from 1) of a column, a unit, or a pair of column and unit.
     file_units : sequence of str or None
         Units that the file gives apart from the names.
 
@@ -214,7 +214,7 @@ def assign_columns(
 def _from_option(
     role: str, value: Any, names: Sequence[str], heads: Sequence[str]
 ) -> tuple[int | None, str | None, str | None]:
-    """Index of a column, its unit, and a message on a fault from a user's option; each None if there is none."""
+    """Index and unit of a column from a user's option, and message on a fault in it; None for each that is absent."""
     stated: str | None = None
     if isinstance(value, Mapping):
         unknown = set(value) - {"column", "unit"}
@@ -247,13 +247,13 @@ def _from_option(
 
 
 def _fits(role: str, name: str) -> bool:
-    """True if the unit `name` is allowed for a role; stresses may be given as forces."""
+    """True if the unit `name` is allowed for a role; units of force are also allowed for stresses."""
     dimension = unit(name)[1]
     return dimension == unit(ROLES[role])[1] or (role in ("shear", "normal") and dimension == unit("N")[1])
 
 
 def _preferred(role: str, candidates: list[int], names: Sequence[str]) -> list[int]:
-    """Candidates whose names mention the load point or effective stress, or have two letters; all if none does."""
+    """Columns that suit a role best: named after load point or effective stress, or with two letters; else all."""
     if len(candidates) < 2:
         return candidates
     marks = {"displacement": (r"load|lp|shear|ram", r"^\W*\w{2}"), "velocity": (r"load|lp",), "normal": (r"eff",)}
@@ -270,9 +270,10 @@ def _missing(role: str, names: Sequence[str]) -> str:
 def _with_unit(
     role: str, name: str, own: str | None, stated: str | None
 ) -> tuple[Column | None, str | None, list[str]]:
-    """Column with its unit, message on a fault (or None), and notes.
+    """Column with its unit (None for a fault), message on the fault (or None), and notes.
 
-    The unit comes from the name or the option, which must not contradict each other, and must fit the role.
+    The unit comes from the column's name (`own`) or from the option (`stated`). The two must not contradict each other,
+    and the unit must fit the role.
     """
     notes: list[str] = []
     stated = None if stated is None else known_unit(stated)
@@ -302,7 +303,7 @@ def _usual(role: str) -> str:
 
 
 def missing_roles(columns: Mapping[str, Column], names: Sequence[str]) -> list[Problem]:
-    """Problems for roles that a record needs and that have no column."""
+    """Problems, one for each role that a record needs and for which there is no column."""
     problems = []
     if "time" not in columns:
         remedy = "; without one, give sampling (the time between rows), or rate (of the load point) with a displacement"

@@ -40,7 +40,7 @@ class MotionRecord(ReadOnly):
         Values in SI units by the name that a simulated run of the machine uses: ``table.x``, ``motor.v``,
         ``guide.friction_force``, ``links.screw.force``.
     units : dict of str to str
-        Units that the columns had in the file; empty text for columns in SI units.
+        Unit that each column had in the file; empty text for a column made from an array in SI units.
     source : str
     notes : tuple of str
         Notes on everything that was noticed or changed.
@@ -87,8 +87,9 @@ def read_motion(
     path : path
         Any file that `read_record` reads.
     columns : mapping of str to str, int or (str or int, str), optional
-        Heading or number (from 1) of each column, or a pair of that and a unit, by the name that a simulated run of the
-        machine uses, such as ``table.x``. By default all columns with such a heading are read: ``table.x (um)``.
+        For each name that a simulated run of the machine uses, such as ``table.x``: heading or number (from 1) of a
+        column, or a pair (heading or number, unit). By default, all columns whose heading is such a name are read:
+        ``table.x (um)``.
     time : str, int or pair, optional
         Column of the time, if its heading does not say so.
     table, between, sampling, skip_bad_lines
@@ -156,7 +157,7 @@ def read_motion(
 def _found(
     asked: Any, names: Sequence[str], heads: Sequence[str], units: Sequence[str | None]
 ) -> tuple[int | None, str | None, str]:
-    """Index and unit of a column (None if unknown), and a message on what is wrong with it (empty if nothing)."""
+    """Index and unit of a column (None if unknown), and a message on a fault (empty if there is none)."""
     column, own = asked if isinstance(asked, (tuple, list)) and len(asked) == 2 else (asked, None)
     if isinstance(column, int) and not isinstance(column, bool) and 1 <= column <= len(names):
         place = column - 1
@@ -270,7 +271,7 @@ def is_response(path: str | PathLike[str]) -> bool:
 
         try:
             return "frequency" in [name for name, _, _ in whosmat(io.BytesIO(read_bytes(place, MOST_RESPONSES)))]
-        except Exception:  # SciPy raises anything for a damaged file; `read_motion` reports what is wrong with it
+        except Exception:  # SciPy raises errors of any type for a damaged file; `read_motion` reports the fault
             return False
     if ending != ".csv":
         return False

@@ -21,7 +21,7 @@ from steadyslip.experiments.measured.columns import ROLES, Column, assign_column
 from steadyslip.experiments.measured.formats import read_columns
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, seconds
 
-ACROSS = re.compile(r"slip|fault", re.IGNORECASE)  # names of displacements that are not the load point's
+ACROSS = re.compile(r"slip|fault", re.IGNORECASE)  # in names of displacements across the fault, not of the load point
 
 
 @checked()
@@ -41,8 +41,8 @@ def read_record(
 
     Columns are found by their names, units are read from them: ``Normal_stress(MPa)``, ``lp_disp_um``, ``time [s]``.
     Otherwise give them: ``time="t"`` (a column), ``shear="MPa"`` (a unit), ``normal=("sn", "MPa")``, or ``friction=3``
-    (the third column). Friction is shear over normal stress unless it has a column of its own. Where the pore pressure
-    has a column, the normal stress is the total one, and friction is shear over the effective normal stress.
+    (the third column). Friction is shear over normal stress unless the file has a column of friction. If it has a
+    column of pore pressure, its normal stress is the total one, and friction is shear over effective normal stress.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def read_record(
     sampling : float or str, optional
         Time between rows, s, for a file without a column of time.
     rate : float or str, optional
-        Constant rate of the load point, m/s, for a file with its displacement but no time. Without either option, time
-        is computed from displacement and velocity if both were measured.
+        Constant rate of the load point, m/s, for a file with its displacement but no time. Without `sampling` and
+        `rate`, time is computed from displacement and velocity if both were measured.
     **columns
         Columns by role: ``time``, ``displacement`` and ``velocity`` (of the load point), ``friction``, ``shear``,
         ``normal``, ``pore_pressure``. A column without a role is left out, with a note.
@@ -134,7 +134,7 @@ def read_record(
 
 
 def _clock(sampling: Any, rate: Any, roles: set[str]) -> Callable[[dict[str, Array], int], tuple[Array, str]] | None:
-    """Function that computes the times of a file without them, with a note; None if the data do not allow it."""
+    """Function that computes times, and a note, for a file without a time column; None if they are unknown."""
     if sampling is not None:
         every = checked_option("sampling", "s", sampling)
         return lambda si, rows: (every * np.arange(rows), f"time: counted, a row every {format_quantity(every, 's')}")
@@ -151,7 +151,7 @@ def _clock(sampling: Any, rate: Any, roles: set[str]) -> Callable[[dict[str, Arr
 
 
 def _integrated_time(displacement: Array, velocity: Array) -> Array:
-    """Elapsed time (s) at each row from displacement and velocity; no time passes where nothing moves."""
+    """Elapsed time (s) at each row from displacement and velocity; rows without motion add no time."""
     with np.errstate(divide="ignore", invalid="ignore"):
         spent = np.diff(displacement) / (0.5 * (velocity[1:] + velocity[:-1]))
     return np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(spent), np.maximum(spent, 0.0), 0.0))])
@@ -160,7 +160,7 @@ def _integrated_time(displacement: Array, velocity: Array) -> Array:
 def cut_between(
     si: dict[str, Array], lines: Array, between: tuple[Any, Any], notes: list[str]
 ) -> tuple[dict[str, Array], Array]:
-    """Columns and line numbers of the rows between two times; rows outside may have missing numbers."""
+    """Columns and line numbers of the rows between two times; times of other rows may be missing."""
     first, last = seconds("start", between[0]), seconds("end", between[1])
     with np.errstate(invalid="ignore"):
         rows = (si["time"] >= first) & (si["time"] <= last)
@@ -173,7 +173,7 @@ def cut_between(
 
 
 def checked_option(name: str, unit: str, value: Any) -> float:
-    """Positive number in the SI unit `unit`, from a number or text with a unit."""
+    """Positive value of the option `name` in the SI unit `unit`, from a number or a text with a unit."""
     try:
         return Parameter(unit, positive, name).checked(value)
     except ParameterError as error:
@@ -192,7 +192,7 @@ def record_from_arrays(
     time: Any, *, friction: Any = None, shear: Any = None, normal: Any = None, displacement: Any = None,
     velocity: Any = None, pore_pressure: Any = None, source: str = "arrays",
 ) -> Record:  # fmt: skip
-    """Make a record from arrays in SI units, cleaned like one from a file.
+    """Make a record from arrays in SI units, which are cleaned like columns of a file.
 
     Parameters
     ----------

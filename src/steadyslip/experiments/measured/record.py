@@ -29,7 +29,7 @@ from steadyslip.files.output import write_columns
 FEWEST_ROWS = 20
 """Least number of samples of a record; chosen by trial: fewer do not determine rates and noise."""
 DRIFT = 0.02
-"""Relative change of the normal stress that counts as drift of the servo, not as a command; chosen by trial."""
+"""Largest relative change of the normal stress that counts as drift of its servo, not as a command; chosen by trial."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Record(Displayed, HasCache):
     shear : ndarray (n,) or None
         Pa.
     displacement : ndarray (n,) or None
-        Displacement of the load point, m; integrated where only its rate was measured.
+        Displacement of the load point, m; the integral of its rate if only the rate was measured.
     velocity : ndarray (n,) or None
         Rate of the load point, m/s; None if not measured.
     source : str
@@ -56,8 +56,8 @@ class Record(Displayed, HasCache):
     integrated : bool
         True if the displacement is the integral of the velocity.
     worth : ndarray (n,) or None
-        Weights in fits: the number of independent measured samples behind each sample, which is a mean of several
-        (fewer than their count where noise is correlated); None if each sample was measured.
+        Weights in fits, if each sample is the mean of several measured samples: the number of these that are
+        independent, which is smaller than their count if the noise is correlated. None if the samples were measured.
     commanded : Loading or None
         Commanded loading, if it was found before samples were left out or averaged.
     """
@@ -87,8 +87,8 @@ class Record(Displayed, HasCache):
     def loading(self) -> Loading:
         """Commanded loading, as found in the measured displacement and normal stress.
 
-        From a displacement that moves with friction, such as one across the fault, the stretch of the spring between
-        it and the load point is removed first.
+        If a spring lies between the displacement sensor and the load point, as for a sensor across the fault, its
+        stretch is added to the displacement first.
         """
         if self.commanded is not None:
             return self.commanded
@@ -112,7 +112,7 @@ class Record(Displayed, HasCache):
 
     @cached_property
     def stress_changes(self) -> bool:
-        """True if the normal stress was changed: by steps, ramps or oscillations, or more than a servo drifts."""
+        """True if the normal stress was changed by steps, ramps or oscillations, or by more than drift of a servo."""
         stress = self.loading.stress
         if stress is None:
             return False
@@ -123,7 +123,7 @@ class Record(Displayed, HasCache):
 
     @cached_property
     def pressure_changes(self) -> bool:
-        """True if the pore pressure was changed: by steps or ramps, or smoothly by more than a drift."""
+        """True if the pore pressure was changed by steps or ramps, or smoothly by more than drift."""
         pore = self.loading.pore
         if pore is None or self.normal is None:
             return False
@@ -146,7 +146,7 @@ class Record(Displayed, HasCache):
         return np.asarray(read_only(rate))
 
     def taken(self, rows: Any, note: str) -> Record:
-        """Record with only the samples that `rows` (mask, slice or indices) selects, with a note."""
+        """Record of the samples that `rows` (mask, slice or indices) selects; `note` is added to its notes."""
 
         def of(values: Array | None) -> Array | None:
             return None if values is None else frozen(values[rows])
@@ -173,8 +173,8 @@ class Record(Displayed, HasCache):
     def decimated(self, count: int) -> Record:
         """Record of about `count` samples, dense after every change and sparse in steady parts.
 
-        Each sample is the mean of measured samples between two changes; `worth` is the number of independent measured
-        samples that it stands for.
+        Each sample is the mean of neighbouring samples with no change among them; `worth` is the number of these that
+        are independent.
         """
         if count >= len(self):
             return self
@@ -183,9 +183,9 @@ class Record(Displayed, HasCache):
     def detrended(self, order: int = 1) -> Record:
         """Record with a trend subtracted from friction: a polynomial in the load point's displacement.
 
-        Time takes the place of the displacement if that was not measured. The polynomial is fitted to the steady parts
-        before every change and at the end; its constant differs between parts. Better use the option ``trend`` of a
-        fit, which fits the trend together with the law, so that confidence intervals include its uncertainty.
+        If the displacement was not measured, the polynomial is in time. It is fitted to the steady parts before every
+        change and at the end, with a different constant in each part. The option ``trend`` of a fit is better: it fits
+        the trend together with the law, so that confidence intervals include the uncertainty of the trend.
         """
         if not (isinstance(order, int) and 1 <= order <= 5):
             raise ParameterError([Problem("order", f"got {order!r}; allowed: a whole number from 1 to 5")])
@@ -283,7 +283,7 @@ class Record(Displayed, HasCache):
         return draw(self, ax=ax)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the columns as CSV, units in the header, in a form that `read_record` reads.
+        """Write the columns, with units in the header, to a CSV file that `read_record` can read.
 
         Raises
         ------
@@ -331,7 +331,7 @@ def whole_record(
 
 
 def frozen(values: Any) -> Array:
-    """Copy as a read-only float array."""
+    """Copy of `values` as a read-only float array."""
     array = np.array(values, dtype=float)
     array.setflags(write=False)
     return array
@@ -350,7 +350,7 @@ def seconds(name: str, value: Any) -> float:
 
 @cached
 def transient_rows(record: Record, count: int) -> Array:
-    """Indices of about `count` rows to keep: dense just after each change of the loading, then ever sparser."""
+    """Indices of about `count` rows: dense just after each change of the loading, then further and further apart."""
     cumulated = np.cumsum(_samples_wanted(record, count))
     last = len(record) - 1
     chosen = np.searchsorted(cumulated, np.arange(0.5, cumulated[-1], 1.0))
@@ -358,7 +358,7 @@ def transient_rows(record: Record, count: int) -> Array:
 
 
 def bin_starts(record: Record, count: int) -> Array:
-    """Indices of the first rows of some `count` groups to be averaged; no group spans a change of the loading."""
+    """Index of the first row of each of about `count` groups to be averaged; no group contains a change of loading."""
     cumulated = np.cumsum(_samples_wanted(record, count))
     fresh = np.flatnonzero(np.diff(np.floor(cumulated - 1e-9), prepend=-1.0))
     moments = [m for step in record.steps for m in (step.time, step.time + step.duration)]
@@ -386,22 +386,22 @@ def binned(record: Record, starts: Array) -> Record:
 
 
 def _samples_wanted(record: Record, count: int) -> Array:
-    """Share (n,) of a sample for each row, at most 1, `count` in all; the density falls as 1/(time since a change)."""
+    """Number of samples (n,), 0 to 1, wanted per row; their sum is `count`, they fall as 1/(time since a change)."""
     time, n = record.time, len(record)
     usual = float(np.median(np.diff(time)))
     weight = np.full(n, 1.0 / (time[-1] - time[0]))  # samples wanted per second
     moments = [time[0], *(step.time for step in record.steps if step.kind != "normal-stress oscillation")]
     for i, moment in enumerate(moments):
         after = time >= moment - 2 * usual
-        share = 0.3 if i == 0 and len(moments) > 1 else 1.0  # the run-in before the first change matters less
+        share = 0.3 if i == 0 and len(moments) > 1 else 1.0  # fewer samples for the sliding before the first change
         weight += (
             share * np.where(after, 1.0 / (np.maximum(time - moment, 0.0) + 5 * usual), 0.0) / 8.0
         )  # about ln(duration / 5 spacings): weighs each change like the whole record
     share = weight * np.gradient(time)
     if count >= n:
         return np.ones(n)
-    rising = np.sort(share)  # rows with the largest share get one each, the others in proportion
+    rising = np.sort(share)  # rows with the largest shares get one sample each, other rows in proportion
     rest = np.cumsum(rising)
-    left = count - np.arange(n - 1, -1, -1)  # samples left for the rows up to each, if all larger ones get one
+    left = count - np.arange(n - 1, -1, -1)  # samples left for row k and smaller shares if each larger share gets one
     k = int(np.flatnonzero((left > 0) & (left * rising <= rest))[-1])
     return np.asarray(np.minimum(share * (left[k] / rest[k]), 1.0))

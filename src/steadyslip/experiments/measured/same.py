@@ -8,8 +8,9 @@ from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.splitting import displacement_noise, spread
 
 FEWEST_SHARED, LEAST_SHARED = 8, 0.5
-"""Least overlap of two records of one measurement: number of samples, and share of the record with fewer samples."""
-SAME_NOISE = 0.3  # largest scatter of the difference over the noise: at least 1 for two experiments, 0 for the same
+"""Least overlap of two records of the same measurement: number of samples of the record with fewer samples, and share
+of that record."""
+SAME_NOISE = 0.3  # largest ratio of the scatter of the difference to the noise; the same data have 0, others 1 or more
 
 
 def is_same_measurement(one: Record, other: Record) -> bool:

@@ -10,7 +10,7 @@ from steadyslip.core.records import Settings, given, option, parameter, part, se
 from steadyslip.experiments.measured.columns import ROLES
 
 FEWEST_KEPT = 50
-"""Least value of `decimate`: fewer samples cannot show several steps; chosen by trial."""
+"""Smallest number of samples that the option `decimate` may ask for: fewer cannot show several steps; by trial."""
 
 
 class ColumnSettings(Settings):

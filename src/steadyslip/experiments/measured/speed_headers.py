@@ -1,4 +1,4 @@
-"""Role, unit and direction of a column from its header in tables of speeds and loops, and faults of the unit."""
+"""Role, unit and direction of columns, from their headers in tables of friction over speed and in presliding loops."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ UNITS_OF_ROLES = {
     "speed": ("m/s", "rad/s"), "force": ("N",), "torque": ("N m",), "friction": ("1",), "load": ("N", "kg", "N m"),
     "displacement": ("m", "rad"), "direction": ("1",),
 }  # fmt: skip
-"""Allowed units of each role; the first is assumed if the file gives none."""
+"""Allowed units of each role; the first unit is assumed if the file gives none."""
 _WORDS = {
     "direction": r"dir|direction|richtung|sense|sinn",
     "load": r"load|normal|normalkraft|normalforce|last|preload|vorspann|vorspannung|fn|belastung|clamp|weight",
@@ -23,7 +23,7 @@ _WORDS = {
     "speed": r"speed|velocity|vel|v|rate|geschw|geschwindigkeit|drehzahl|n|omega|ω|w|feed|vorschub|feedrate|qd|dq",
     "displacement": r"displacement|disp|position|pos|x|s|weg|angle|winkel|deflection|presliding|q|phi|φ",
 }
-"""Names of columns by role (regular expressions)."""
+"""Regular expressions for the names that a column with each role may have."""
 SCATTER = re.compile(
     r"(?i)(?<![a-zäöü])(σ|sigma|std|stdev|sd|error|err|uncertainty|streuung|standardabweichung)(?![a-zäöü])"
 )
@@ -36,7 +36,7 @@ SPELLED = {
 
 
 def split_head(name: str, apart: str | None) -> tuple[str, str | None]:
-    """Name of a column without its unit, and its unit (None if unknown); `apart` is a unit given beside the name."""
+    """Name of a column without its unit, and its unit (None if unknown); `apart` is a unit given outside the name."""
     head, own = split_name(name)
     if own is None:
         match = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name) or re.fullmatch(
@@ -50,7 +50,7 @@ def split_head(name: str, apart: str | None) -> tuple[str, str | None]:
 
 
 def role_of(head: str, own: str | None) -> str | None:
-    """Role of a column from its name and unit; None if there is none or if they contradict each other."""
+    """Role of a column from its name and unit; None if it has no role or if name and unit contradict each other."""
     if SCATTER.search(head):
         return None
     if _is_other(head, own):
@@ -110,7 +110,7 @@ _TEMPERATURES = ("c", "k", "f", "degc", "degf", "celsius", "kelvin", "fahrenheit
 
 
 def split_bracket(head: str, own: str | None) -> tuple[str, str]:
-    """Name of a column without a bracket that holds an unknown unit, and its unit (empty if it has none)."""
+    """Name of a column without its bracket, and its unit: `own` or else the text in the bracket; empty if none."""
     bracket = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", head)
     return (bracket[1], own or bracket[2]) if bracket else (head, own or "")
 
@@ -121,7 +121,7 @@ def _is_letter(name: str) -> bool:
 
 
 def _is_other(head: str, own: str | None) -> bool:
-    """True for a column of another quantity: a temperature, or one letter with a unit that no role allows."""
+    """True for a column that needs no role: a temperature, or one letter with a unit that no role allows."""
     name, said = split_bracket(head, own)
     if said.lower().replace("°", "").replace("℃", "c") in _TEMPERATURES:
         return True

@@ -46,11 +46,11 @@ class SpeedTable:
     ----------
     source : str
     speed : ndarray (n,)
-        m/s, or rad/s where `turns`; negative backward.
+        m/s, or rad/s if `turns`; negative for backward motion.
     friction : ndarray (n,)
         Positive: a force (N), a torque (N m) if `turns`, or a coefficient if `is_coefficient`.
     load : ndarray (n,) or None
-        Normal load, N; or the torque that the joint transmits, N m, if `load_turns`.
+        Normal load, N, or the torque that the joint transmits, N m, if `load_turns`; None if it is unknown.
     turns, is_coefficient : bool
     speed_unit : str
         Unit of the speeds in the file.
@@ -100,7 +100,7 @@ class PreslidingLoop:
 class _Role:
     """Column with a known role: its values in SI units, its unit, and the direction that its name states (0: none).
 
-    `is_bare` is true if the file gives no unit, so that it was assumed.
+    `is_bare` is true if the file gives no unit, so that the unit was assumed.
     """
 
     values: Array
@@ -113,8 +113,8 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
     """Read a table of friction at constant speeds.
 
     Columns are found by their names and units: ``speed [mm/min]``, ``F (N)``, ``torque_Nm``, ``mu``, ``load [kN]``,
-    ``direction`` (words or signs; without this column, negative speeds are backward). Where friction has two columns,
-    ``forward [N]`` and ``backward [N]``, each row of the file becomes two rows.
+    ``direction`` (words or signs; without this column, negative speeds are backward). If friction has two columns, such
+    as ``forward [N]`` and ``backward [N]``, each row of the file becomes two rows of the table.
 
     Parameters
     ----------
@@ -196,9 +196,9 @@ def read_speed_table(path: str | PathLike[str], *, load: Any = None, **columns: 
 
 
 def _without_load(speed: Array, torque: Array, load: Array) -> tuple[Array, Array, Array | None, list[str]]:
-    """Speed, torque and load of each direction of motion in which the load is not always zero, and questions.
+    """Speed, torque and load of the rows, without a direction of motion in which the load is zero, and questions.
 
-    The questions are about the direction that is left out. The load is None if it is zero in both directions.
+    A question asks about the direction that is left out. The load is None if it is zero in both directions.
     """
     if not np.any(load > 0):
         return speed, torque, None, []
@@ -219,7 +219,7 @@ def checked_option(name: str, value: Any, si_unit: str, source: str) -> float:
     Raises
     ------
     ParameterError
-        If it is not positive or has another dimension; names the option.
+        If the value is not positive or has another dimension; the message names the option.
     """
     try:
         return float(Parameter(si_unit, positive, name).checked(value))
@@ -231,7 +231,7 @@ def checked_option(name: str, value: Any, si_unit: str, source: str) -> float:
 
 
 def _signs(speed: Array, friction: Array, kind: str, direction: bool) -> list[str]:
-    """Notes on signs of speed or friction that are not used."""
+    """Notes on signs of speed or friction that do not give the direction of motion."""
     notes = []
     if np.all(speed < 0) and not direction:
         notes.append("all speeds are negative: the friction is that of backward motion")
@@ -244,7 +244,7 @@ def _signs(speed: Array, friction: Array, kind: str, direction: bool) -> list[st
 
 
 def table_from_arrays(arrays: Mapping[str, Any]) -> SpeedTable:
-    """Table from arrays in SI units by role: speed (m/s, or rad/s with torque), force, torque or friction, load.
+    """Table from arrays in SI units: speed (m/s, or rad/s with torque), load, and one of force, torque or friction.
 
     Raises
     ------
@@ -320,13 +320,13 @@ def _table(path: Path) -> Table:
 
 
 def _needed(head: str, own: str | None) -> str | None:
-    """Role of a column in a table of speeds or a loop; None for a column that may hold anything."""
+    """Role of a column in a table of speeds or a loop; None if the column is not needed and may hold anything."""
     role = role_of(head, own)
     return None if role == "displacement" and own is None else role
 
 
 def _refuse_misfits(path: Path, role: str = "") -> None:
-    """Raise an error if the unit of a column contradicts its name: any speed, force, torque or load, or one `role`."""
+    """Raise an error if a unit contradicts its column's name: a speed, force, torque or load, or only a `role`."""
     table = _table(path)
     heads = [split_head(name, apart) for name, apart in zip(table.names, table.units, strict=True)]
     heads = [head if not role or role in roles_named(split_bracket(*head)[0]) else ("", None) for head in heads]
@@ -405,14 +405,14 @@ def _asked(
 
 
 def _stacked(speed: Array, one: _Role, direction: list[_Role] | None) -> tuple[Array, Array]:
-    """Signed speeds (n,) and friction (n,) of one column of friction; the sign is that of its direction."""
+    """Speeds (n,), negative for backward motion, and friction (n,) of one column of friction."""
     if direction is not None:
         return np.abs(speed) * np.where(direction[0].values > 0, 1.0, -1.0), one.values
     return (np.abs(speed) * one.side if one.side else speed), one.values
 
 
 def _unsigned(source: str, speed: Array, friction: Array, kind: str) -> Array:
-    """Size of friction (n,); its sign may follow the direction of the speeds or of the pull, or be always positive."""
+    """Absolute friction (n,), if it has one sign in each direction of motion; raises an error otherwise."""
     for side in (1.0, -1.0):
         own = friction[np.sign(speed) == side]
         if np.any(own == 0) or (len(own) and np.any(np.sign(own) != np.sign(own[0]))):

@@ -1,6 +1,6 @@
 """Questions to the user about a table of friction over speed whose numbers are implausible.
 
-They name the likely cause: exchanged columns, a wrong unit, or a constant load such as a weight.
+A question names the likely cause: exchanged columns, a wrong unit, or a constant load such as a weight.
 """
 
 from __future__ import annotations
@@ -14,14 +14,16 @@ from steadyslip.core.dimensions import unit
 from steadyslip.core.format import format_quantity
 
 FALLS, FALLS_POWER = 3.0, 3.0
-"""Largest plausible fall of friction with speed: this factor, or this power of the ratio of the speeds if larger."""
+"""Friction may fall with speed by the first number as a factor or, if that is larger, by the ratio of the speeds to the
+power of the second number."""
 STEEPEST = 20.0
-"""Largest plausible rise of friction with speed, as a factor; or the ratio of the speeds squared (drag) if larger."""
+"""Friction may rise with speed by this factor, or by the square of the ratio of the speeds (drag) if that is larger."""
 SMALLEST, LARGEST = 3e-4, 3.0
 """Plausible friction coefficients: rolling guides have 0.001 to 0.005, rubber has 1 to 2."""
-USUAL = (0.003, 1.0)  # another unit is suggested if it gives a friction coefficient between these
+USUAL = (0.003, 1.0)  # another unit is suggested if it gives a friction coefficient between these values
 FAST, FASTEST = 1.0, 10.0
-"""Speeds (m/s) that guides do not reach, for a column without a unit and for one with a unit; brakes reach 50."""
+"""A speed (m/s) above the first number in a column without a unit, or above the second in a column with a unit, is
+questioned: guides do not reach it, although brakes reach 50."""
 UNEQUAL = 2.0  # largest plausible ratio of friction in the two directions; gears, screws and seals have up to 1.5
 NEAR = 1.5  # largest ratio of a forward and a backward speed at which friction is compared
 

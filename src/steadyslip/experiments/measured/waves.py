@@ -20,24 +20,25 @@ from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.measured.record import Record, frozen
 from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement_noise
 
-GRID = 4096  # equally spaced positions for the search of a wave: 10 for each period of the shortest
+GRID = 4096  # equally spaced positions on which a wave is searched: 10 for each period of the shortest wave
 FEWEST_PERIODS, MOST_PERIODS = 3, GRID // 10
-LEAST_SHARE = 0.2  # least share of a wave in the variance about the lines; in noise of correlation 0.9 it is 0.01
+LEAST_SHARE = 0.2  # least share of the variance about the lines that is due to a wave; correlated noise reaches 0.01
 WANDERS = 1.3  # a wave is looked for if deviations from the lines exceed this multiple of the sample-to-sample noise
 MANY_SLIPS = 3  # a wave is also looked for if this many slips and glitches were found
-ROUNDS = 2  # fits of wave and lines in turn: changes of the rate are located better once the wave is removed
-TURNS = 12  # fixed-point iterations for the position; each reduces its error to 2 pi amplitude / period of the last
-STEPS = 20  # evaluations of a fit that starts from a linear one: a real wave takes 2 to 4, noise takes hundreds
+ROUNDS = 2  # times that wave and lines are fitted in turn: without the wave, changes of the rate are located better
+TURNS = 12  # fixed-point iterations for the position; each multiplies the error by up to 2 pi amplitude / period
+STEPS = 20  # most evaluations of a nonlinear fit of a wave: a real wave takes 2 to 4, noise takes hundreds
 OUTLIER = 4.0  # samples are ignored beyond this many standard deviations
 AFTER, SETTLED = 0.05, 6.0
-"""Start of a run that is ignored, as the servo may still be settling: share of the run, and multiple of its lag."""
-LEAST_GAIN = 0.8  # deviations, or slips and glitches, must fall below this share when the wave is removed
-LEAST_SIZE = 10.0  # least amplitude in standard errors, computed for white noise
+"""Part of a run that is ignored at its start, as the servo may still be settling: the share of the run in the first
+number, and the second number times the lag of the servo."""
+LEAST_GAIN = 0.8  # removal of a wave must reduce deviations, or the number of slips and glitches, to below this share
+LEAST_SIZE = 10.0  # least amplitude of a wave, in its standard errors for white noise
 WAVE = "was taken out of the displacement"
 
 
 def without_wave(record: Record) -> Record:
-    """Record without the periodic error of its displacement sensor, with a note; `record` itself if it has none."""
+    """Record without the periodic error of its displacement sensor, with a note; `record` itself if there is none."""
     load, moved = record.loading.load, record.displacement
     if load is None or moved is None or record.integrated or load.curve is not None or len(record) < 2 * FEWEST_PERIODS:
         return record
@@ -72,7 +73,7 @@ def without_wave(record: Record) -> Record:
 def _lines(time: Array, course: Course) -> tuple[Array, Array]:
     """Regressors (n, k) of a straight line for each run between changes of the rate, and mask (n,) of samples to fit.
 
-    Samples just after each change are masked: how the load point follows a change is only known without the wave.
+    Samples just after each change are left out: the load point's response is only known after the wave is removed.
     """
     ends = np.array([time[0], *(change.time for change in course.changes), time[-1]])
     keep = np.ones(len(time), dtype=bool)
@@ -88,7 +89,7 @@ def _lines(time: Array, course: Course) -> tuple[Array, Array]:
 
 
 def _periods(time: Array, moved: Array, course: Course) -> float | None:
-    """Number of periods in the travel, for the strongest wave in the deviations from lines; None if none is strong."""
+    """Number of periods in the travel of the strongest wave about the lines; None if no wave is strong enough."""
     lines, keep = _lines(time, course)
     moved, lines = moved[keep], lines[keep]
     left = moved - lines @ np.linalg.lstsq(lines, moved)[0]
@@ -110,11 +111,11 @@ def _periods(time: Array, moved: Array, course: Course) -> float | None:
 def _fitted(time: Array, moved: Array, course: Course, start: Array) -> tuple[Array, Array, float] | None:
     """Fit of a wave: parameters (sine and cosine amplitude, period; m), position (n,), standard error of an amplitude.
 
-    None if the fit does not converge, as happens if there is no wave.
+    The result is None if the fit does not converge, as happens if there is no wave.
     """
     lines, keep = _lines(time, course)
 
-    for _ in range(2):  # the second without outliers of the first
+    for _ in range(2):  # the second fit leaves out the outliers of the first fit
         base = np.linalg.qr(lines[keep])[0]
 
         def left(parts: Array, base: Array = base, own: Array = moved[keep]) -> Array:
@@ -160,7 +161,7 @@ def _orthogonal(values: Array, base: Array) -> Array:
 
 
 def _first(time: Array, moved: Array, course: Course, count: float) -> Array:
-    """Amplitudes and period of a wave with about `count` periods in the travel, from a linear fit with the lines."""
+    """Amplitudes and period of a wave with about `count` periods in the travel, from a linear fit of wave and lines."""
     lines, keep = _lines(time, course)
 
     def fit(count: float) -> tuple[float, Array]:

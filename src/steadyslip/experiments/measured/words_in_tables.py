@@ -13,7 +13,7 @@ FORWARD = r"forward|forwards|fwd|fw|vor|vorwärts|hin|positive|pos|cw|\+"
 BACKWARD = r"backward|backwards|bwd|back|bw|reverse|rück|rückwärts|zurück|negative|neg|ccw|[-−–]"
 _DIRECTION = re.compile(rf"(?i)(?<![^\s,;|\t\"])(?:{FORWARD}|{BACKWARD})(?![^\s,;|\t\"])")
 _DASHES = ("-", "−", "–")
-"""Cells that mean backward in a column of directions, and no value in other columns."""
+"""Cells that mean backward in a column of directions, and a missing value in other columns."""
 _DIRECTIONS = "forward and backward, vor and zurück, + and -, 1 and -1"
 
 
@@ -67,7 +67,7 @@ def without_words(raw: bytes, role_of: Callable[[str], str | None]) -> tuple[byt
 
 
 def _plain(column: Sequence[str], role: str | None) -> list[str] | None:
-    """Cells of a column as numbers or missing; None if it holds words."""
+    """Cells of a column, with directions as 1 and -1 and dashes as nan; None if it holds other words."""
     words = [cell for cell in column if not _is_number(cell) and (cell.lower() not in MISSING or cell in _DASHES)]
     said = [cell for cell in words if cell not in _DASHES]
     if (said or role == "direction") and all(_DIRECTION.fullmatch(cell) for cell in words):
@@ -85,7 +85,7 @@ def _holds_words(name: str, role: str, column: Sequence[str]) -> Problem:
 
 
 def _is_number(cell: str) -> bool:
-    """True for a number, date or time of day."""
+    """True if a cell holds a number, date or time of day."""
     found = value_of(cell)
     return found is not None and found == found
 

@@ -1,7 +1,6 @@
 """Readers of files with measured columns, chosen by the ending of the file name; columns are not interpreted.
 
-Each format is one module with a function ``read(path, table)`` that returns a `Table`; a new one needs a line in
-`FORMATS`.
+Each format has a module with a function ``read(path, table)`` that returns a `Table`, and a line in `FORMATS`.
 """
 
 from __future__ import annotations
@@ -20,11 +19,12 @@ from steadyslip.files.inputs import check_file
 
 __all__ = ["FORMATS", "Table", "read_columns"]
 
-MOST_BINARY = 2**31  # bytes of a file; `MOST_VALUES` doubles have 2^28
-SHORT_TEXT = 2**20  # bytes of a text that is read without a separate process: its size bounds time and memory
+MOST_BINARY = 2**31  # largest size of a file, bytes: over six times what `MOST_VALUES` double-precision numbers take
+SHORT_TEXT = 2**20  # largest size, bytes, of a text read in this process: it needs little time and memory
 SECONDS, BYTES_A_SECOND, MOST_SECONDS = 10.0, 2**20, 85.0
-"""CPU time allowed to read a file (s): fixed part, bytes per further second, upper limit. Workbooks take half of it."""
-MOST_SAID = 300  # characters of another library's message that are quoted
+"""CPU time (s) allowed to read a file, bytes of the file for which a further second is allowed, and largest time (s) in
+all. Workbooks, the slowest format, take half of this time."""
+MOST_SAID = 300  # largest number of characters quoted from another library's message
 FORMATS = {
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("HDF5", "hdf5")),
     ".nc": ("netCDF", "netcdf"),
@@ -37,7 +37,7 @@ FORMATS = {
 
 
 def read_columns(path: Path, table: str | None = None, skip_bad_lines: bool = False) -> Table:
-    """Columns of a file in the format of its ending; text if the ending is unknown.
+    """Columns of a file, read in the format that its ending stands for; as text if the ending is unknown.
 
     Formats that need another library, and long texts, are read in a separate process with limits on time and memory.
 
@@ -81,6 +81,6 @@ def _by_library(path: Path, table: str | None, kind: str, module: str) -> Table:
         raise NotAvailable(
             f"{str(path)!r}: this format needs the package {package}; install steadyslip[lab]"
         ) from error
-    except Exception as error:  # readers of other libraries raise anything for a damaged file
+    except Exception as error:  # other libraries raise exceptions of any type for a damaged file
         why = " ".join(str(error).split())[:MOST_SAID]
         raise NotAvailable(f"cannot read {str(path)!r} as {kind}: {type(error).__name__}: {why}") from error

@@ -32,7 +32,7 @@ _FORTRAN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[dD][-+]?\d+")
 
 
 def number(cell: str, mark: str) -> float | None:
-    """Number in a cell with a given decimal mark; NaN for an empty cell, None for other text.
+    """Number in a cell, written with the decimal mark `mark`; NaN for an empty cell, None for other text.
 
     >>> number("1,234.5", "."), number("1.234,5", ","), number("1 234", "."), number("1.2.3", "."), number("1d3", ".")
     (1234.5, 1234.5, 1234.0, None, 1000.0)
@@ -58,13 +58,13 @@ def _float(text: str) -> float | None:
 
 
 def number_with_any_mark(cell: str) -> float | None:
-    """Number in a cell with either decimal mark; None if the cell holds other text."""
+    """Number in a cell, written with a decimal point or comma; NaN for an empty cell, None for other text."""
     found = number(cell, POINT)
     return number(cell, COMMA) if found is None else found
 
 
 def decimal_mark(cell: str) -> str | None:
-    """Decimal mark of a cell; None if the cell does not determine it, such as 12 or 1,234.
+    """Decimal mark of the number in a cell; None if the number does not determine it, such as 12 or 1,234.
 
     >>> [decimal_mark(text) for text in ("0.61", "12,5", "1.234,5", "1,234,567", "1,234", "12")]
     ['.', ',', ',', '.', None, None]
@@ -82,7 +82,7 @@ def decimal_mark(cell: str) -> str | None:
 
 
 def decimal_marks(names: Sequence[str], columns: Iterable[Iterable[str]]) -> tuple[list[str], list[str], str | None]:
-    """Decimal mark of each column, from its own numbers or else from those of other columns.
+    """Decimal mark of each column, from the numbers in the column or else from those in other columns.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def decimal_marks(names: Sequence[str], columns: Iterable[Iterable[str]]) -> tup
 
 DAY = 86_400.0  # s
 _CLOCK = re.compile(r"^(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)(?: ?([AaPp])\.?[Mm]\.?)?$")
-_STOPWATCH = re.compile(r"^(\d{1,3}):([0-5]\d[.,]\d+)$")  # 1:30.5, with a fraction: not hours and minutes
+_STOPWATCH = re.compile(r"^(\d{1,3}):([0-5]\d[.,]\d+)$")  # minutes and seconds, 1:30.5; hours have no fraction
 _DAYS = (
     (re.compile(r"^(\d{1,2})\.(\d{1,2})\.(\d{4})$"), (3, 2, 1)),  # 31.12.2024
     (re.compile(r"^(\d{1,2})/(\d{1,2})/(\d{4})$"), (3, 1, 2)),  # 12/31/2024, or 31/12/2024 where no month is 31
@@ -139,7 +139,7 @@ _DATE = re.compile(r"^(\d{4})-(\d\d)-(\d\d)[T ](\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)
 
 
 def moment(text: str) -> float | None:
-    """Seconds since midnight, or since 1970 if there is a date; None if the text is neither.
+    """Seconds from midnight to a time of day, or from 1970 to a date with time of day; None for other text.
 
     >>> moment("12:30:01.5"), moment("1970-01-02T00:00:00Z"), moment("02.01.1970 1:00:00"), moment("12.5")
     (45001.5, 86400.0, 90000.0, None)
@@ -164,7 +164,7 @@ def moment(text: str) -> float | None:
 
 
 def day(text: str) -> float | None:
-    """Seconds since 1970 at the beginning of a date; None if the text is no date."""
+    """Seconds from 1970 to the beginning of a date; None if the text is no date."""
     for pattern, order in _DAYS:
         if match := pattern.match(text):
             year, month, number = (int(match[k]) for k in order)
@@ -178,13 +178,13 @@ def day(text: str) -> float | None:
 
 
 def time_of(cell: str) -> float | None:
-    """Seconds of a time of day or of a date in a cell (see `moment` and `day`); None for other text."""
+    """Seconds to the time of day or date in a cell, counted as by `moment` and `day`; None for other text."""
     plain = cell.strip().strip('"')
     return moment(plain) if (date := day(plain)) is None else date
 
 
 def value_of(cell: str) -> float | None:
-    """Time, or number with either decimal mark, in a cell; NaN for an empty cell, None for other text."""
+    """Time (s) or number in a cell, with decimal point or comma; NaN for an empty cell, None for other text."""
     return number_with_any_mark(cell) if (found := time_of(cell)) is None else found
 
 

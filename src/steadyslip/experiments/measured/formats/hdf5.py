@@ -1,4 +1,4 @@
-"""Reader of HDF5 files: datasets below a group, columns of compound types; no links to other files are followed."""
+"""Reader of HDF5 files: datasets in a group, and fields of compound datasets; links to other files are not followed."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from steadyslip.experiments.measured.formats.table import (
     from_vectors,
 )
 
-MOST_DATASETS = 10_000  # chosen by trial, far above those of any record
-MOST_LINKS = 16  # soft links followed one after another, against cycles
+MOST_DATASETS = 10_000  # largest number of datasets that are read, far above that of any record; chosen by trial
+MOST_LINKS = 16  # largest number of soft links followed one after another, as links may form a cycle
 COLUMN_NAMES = ("columns", "column_names", "names", "header", "channels")
 
 
 def read(path: Path, table: str | None) -> Table:
-    """Numeric datasets of a file, or below one of its groups."""
+    """Numeric datasets of a file or, if `table` is given, of that group or dataset."""
     with h5py.File(path, "r") as file:
         group = file if table is None else member(file, table)
         if group is None:
@@ -33,7 +33,7 @@ def read(path: Path, table: str | None) -> Table:
 
 
 def member(group: Any, name: str, links: int = MOST_LINKS) -> Any:
-    """Object below a group of the same file by names joined with ``/``; None if it is not in the file."""
+    """Object in a group, at a path of names joined with ``/``; None if there is none or it is in another file."""
     for part in name.strip("/").split("/"):
         link = group.get(part, getlink=True) if isinstance(group, h5py.Group) else None
         if isinstance(link, h5py.SoftLink) and links:
@@ -56,7 +56,7 @@ def numbers_in(path: Path, items: Iterable[Any]) -> None:
 
 
 def _named(path: Path, found: Iterable[tuple[str, tuple[Any, str | None]]]) -> dict[str, tuple[Any, str | None]]:
-    """Columns by the last part of their names, or by the full name where that is ambiguous."""
+    """Columns by the last part of their names, or by the full name if several columns have the same last part."""
     pairs = list(found)
     check_ambiguous_names(path, [name for name, _ in pairs], "group")
     short = [name.rpartition("/")[2] for name, _ in pairs]
@@ -73,7 +73,7 @@ def _datasets(path: Path, group: Any) -> Iterator[tuple[str, tuple[Any, str | No
     items: dict[str, Any] = {}
     if isinstance(group, h5py.Dataset):
         items[group.name.rpartition("/")[2]] = group
-    else:  # visititems visits each object once, follows cycles of links no further, and no external links
+    else:  # visititems visits each object once, so that cycles of links end, and follows no external links
         group.visititems(items.__setitem__)
     chosen = {name: item for name, item in items.items() if isinstance(item, h5py.Dataset)}
     if len(chosen) > MOST_DATASETS:
@@ -98,7 +98,7 @@ def _datasets(path: Path, group: Any) -> Iterator[tuple[str, tuple[Any, str | No
 
 
 def _names_of_columns(item: h5py.Dataset) -> list[str]:
-    """Column names of a matrix from an attribute; empty if it has none."""
+    """Names of a matrix's columns from one of its attributes; empty if no attribute holds them."""
     for attribute in COLUMN_NAMES:
         raw = np.atleast_1d(item.attrs.get(attribute, ()))
         names = [one.decode() if isinstance(one, bytes) else str(one) for one in raw]

@@ -1,4 +1,4 @@
-"""Reader of LabVIEW text files (``.lvm``): a file header, then segments, each with a header of its channels."""
+"""Reader of LabVIEW text files (``.lvm``): a header of the file, then segments that begin with a header of channels."""
 
 from __future__ import annotations
 
@@ -62,14 +62,14 @@ def _header_before(rows: list[list[str]], end: int) -> Header:
 
 
 def _begin_of_header(rows: list[list[str]], end: int) -> int:
-    """First line of a segment's header, which gives the number of its channels."""
+    """Index of the first line of a segment's header, the line with the number of channels."""
     return next(i for i in range(end, -1, -1) if rows[i][0] in ("Channels", END) and i < end)
 
 
 def _table(
     names: list[str], values: np.ndarray, lines: np.ndarray, header: Header, each: str, segments: int, path: Path
 ) -> Table:
-    """Table of the channels with units and one time column."""
+    """Table of all channels with their units and a single time column."""
     notes = ["a LabVIEW file" + (f" of {segments} segments, joined" if segments > 1 else "")]
     places = [k for k, name in enumerate(names) if name not in (TIME, "")]
     times = [k for k, name in enumerate(names) if name == TIME]

@@ -1,7 +1,7 @@
 """Reader of MATLAB files: vectors, matrices, structures, structure arrays and cells; version 7.3 is HDF5.
 
-In every version a structure becomes a dict, a structure array or cell array a list. ``p(2)`` is the second structure of
-an array, as in MATLAB; if each has a name and one vector, they are channels.
+In every version a structure becomes a dict, and a structure array or cell array becomes a list. ``p(2)`` is the second
+structure of an array, as in MATLAB. Structures of an array that hold a name and one vector are taken for channels.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from steadyslip.experiments.measured.formats.table import (
 )
 from steadyslip.files.inputs import read_bytes
 
-DEEPEST = 8  # levels of structures and cells that are read; chosen by trial
-MOST_MEMBERS = 100_000  # of structures and cells; chosen by trial, far above those of any record
+DEEPEST = 8  # structures and cells within each other are read down to this level; chosen by trial
+MOST_MEMBERS = 100_000  # largest number of members of structures and cells, far above that of any record; by trial
 HEAD, TAG, PACKED = 128, 8, 15  # bytes of the file's header and of an element's tag; type of a compressed element
 BYTES, ONE_PIECE = 8, 2**20  # bytes of a number; bytes decompressed at a time
 CLASS = "MATLAB_class"
@@ -37,7 +37,7 @@ Numbers = dict[str, tuple[Any, str | None]]
 
 
 def read(path: Path, table: str | None) -> Table:
-    """Numeric vectors of a file or of one of its variables: ``p1``, ``p1.data`` in a structure, ``p(2)``."""
+    """Numeric vectors of a file or, if `table` is given, of a variable such as ``p1``, ``p1.data`` or ``p(2)``."""
     try:
         check_size(path, sum(math.prod(shape) for _, shape, _ in whosmat(path)))
         _check_unpacked(path)
@@ -69,18 +69,18 @@ def _is_inside(name: str, part: str) -> bool:
 
 
 class ReadCount:
-    """Count of the members and numbers read from a file of version 7.3, whose links may repeat objects."""
+    """Count of the members and numbers read from a file of version 7.3, in which links may repeat objects."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.members, self.numbers = path, 0, 0
 
     def take(self, members: int, numbers: int = 0) -> None:
-        """Add to the counts.
+        """Add members and numbers to the counts.
 
         Raises
         ------
         NotAvailable
-            If they exceed the limits.
+            If the counts exceed the limits.
         """
         self.members += members
         self.numbers += numbers
@@ -90,7 +90,7 @@ class ReadCount:
 
 
 def _check_unpacked(path: Path) -> None:
-    """Raise an error for a file of version 5 to 7 whose compressed variables unpack to more than a record may have."""
+    """Raise an error if a file of version 5 to 7 holds more numbers, once decompressed, than a record may have."""
     size, place = 0, HEAD
     content = read_bytes(path, BYTES * MOST_VALUES)
     order = "<" if content[HEAD - 2 : HEAD] == b"IM" else ">"
@@ -108,7 +108,7 @@ def _check_unpacked(path: Path) -> None:
 
 
 def _from_scipy(value: Any, deep: int) -> Any:
-    """Value read by SciPy as dicts, lists, strings and arrays."""
+    """Value that SciPy has read, converted to dicts, lists, strings and arrays."""
     array = np.asarray(value)
     if not deep or array.dtype.kind not in "OV":
         return str(value) if array.dtype.kind == "U" and array.size == 1 else array
@@ -134,7 +134,7 @@ def _of_version_73(path: Path) -> dict[str, Any]:
 
 
 def _from_hdf5(item: Any, deep: int, left: ReadCount) -> Any:
-    """Value of an HDF5 object as in MATLAB, as dicts, lists, strings and arrays; HDF5 stores matrices transposed."""
+    """Value of an HDF5 object as dicts, lists, strings and arrays; HDF5 holds matrices of MATLAB transposed."""
     import h5py
 
     from steadyslip.experiments.measured.formats.hdf5 import member, numbers_in
@@ -165,7 +165,7 @@ def _from_hdf5(item: Any, deep: int, left: ReadCount) -> Any:
 
 
 def _parts(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Pairs (name, value) for a variable and for every member that can be addressed by a name."""
+    """Pairs (name, value) for a variable and for every member of it that a name such as ``p1.data`` selects."""
     yield name, value
     if isinstance(value, Mapping):
         for field, one in value.items():
@@ -190,7 +190,7 @@ def _is_numbers(value: Any) -> bool:
 
 
 def _channels(value: Any) -> Numbers | None:
-    """Channels of a structure array with a name, one vector and optionally a unit each; None if it has another form."""
+    """Channels from a structure array whose structures hold a name, one vector and perhaps a unit; None otherwise."""
     if not isinstance(value, list) or len(value) < 2 or not all(isinstance(one, Mapping) for one in value):
         return None
     found: Numbers = {}
@@ -205,7 +205,7 @@ def _channels(value: Any) -> Numbers | None:
 
 
 def _with_header(numeric: Numbers, inside: dict[str, Any]) -> Numbers:
-    """Columns of the only matrix, named by the only list of as many words, as MATLAB's `importdata` writes them."""
+    """Columns of the only matrix, with names from the only list of as many words (written by MATLAB's `importdata`)."""
     matrices = [name for name, (value, _) in numeric.items() if value.ndim == 2]
     if len(matrices) != 1:
         return numeric
@@ -224,6 +224,6 @@ def _words(value: Any) -> list[str]:
 
 
 def _shortened(found: Numbers) -> Numbers:
-    """Columns with the structures dropped from their names, if the names stay different."""
+    """Columns by the last part of their names, without the structures, if these parts differ; else unchanged."""
     short = [name.rpartition(".")[2] for name in found]
     return dict(zip(short, found.values(), strict=True)) if len(set(short)) == len(short) else found

@@ -1,4 +1,4 @@
-"""Reader of netCDF files: variables of a classic file, such as a saved run; version 4 is HDF5."""
+"""Reader of netCDF files: classic files, such as saved runs, are read here; version 4 is read as HDF5."""
 
 from __future__ import annotations
 

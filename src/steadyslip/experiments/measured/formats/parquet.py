@@ -27,14 +27,14 @@ def read(path: Path, table: str | None) -> Table:
 
 
 def _is_numeric(kind: pyarrow.DataType) -> bool:
-    """True for numbers, dates and durations, also as values of a dictionary type."""
+    """True for a type of numbers, dates or durations, or for a dictionary type whose values have such a type."""
     own = kind.value_type if types.is_dictionary(kind) else kind
     is_moment = types.is_timestamp(own) or types.is_date(own) or types.is_duration(own)
     return bool(types.is_integer(own) or types.is_floating(own) or is_moment)
 
 
 def _numbers(column: np.ndarray) -> tuple[np.ndarray, str | None]:
-    """Values and unit: numbers unchanged, times as seconds since the first, durations in seconds."""
+    """Values and unit of a column: numbers unchanged, times as seconds since the first time, durations in seconds."""
     if column.dtype.kind not in "mM":
         return column, None
     spans = column - column[0] if column.dtype.kind == "M" and len(column) else column

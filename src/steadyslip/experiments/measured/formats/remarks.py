@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterator, Sequence
 
 Line = tuple[int, str]
-MOST_BELOW = 200  # lines of remarks below a table; chosen by trial
-SHOWN = 40  # characters of a remark in a note
+MOST_BELOW = 200  # largest number of lines of remarks below a table; chosen by trial
+SHOWN = 40  # largest number of characters of a remark that a note quotes
 _WORD = re.compile(r"[^\W\d_]{2,}|[*=#~-]{2,}|\x1a|\x00")
 
 
 def harmless_lines(body: Sequence[Line], header: Sequence[Line], bad: set[int]) -> tuple[set[int], list[str]]:
-    """Numbers of the bad lines that are no damage (repeated headers, remarks at the end), and notes on them.
+    """Numbers of bad lines that may be left out (repeated headers, remarks at the end), and notes on these lines.
 
     Parameters
     ----------

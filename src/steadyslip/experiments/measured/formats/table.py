@@ -16,11 +16,12 @@ from steadyslip.experiments.measured.columns import known_unit, listed
 from steadyslip.experiments.measured.formats.cells import seconds_since_first
 
 LENGTH_TOLERANCE = 0.03
-"""Relative difference in length of columns that counts as an interrupted acquisition; chosen by trial."""
+"""Columns whose lengths differ by a smaller share belong together: the acquisition was interrupted; chosen by trial."""
 MOST_VALUES, MOST_ROWS = 40_000_000, 10_000_000
-"""Most numbers in a file and in a column: with the copies made by cleaning, they fit into a gigabyte."""
+"""Largest number of values in a file and in a column: with the copies made by cleaning, they fit into a gigabyte."""
 FEW_VALUES, VALUES_A_BYTE = 2**20, 16
-"""Numbers that any file may have, plus this many for each of its bytes: measured noise takes a byte per number."""
+"""A file may hold the first number of values, plus the second for each of its bytes. Measured noise takes about a byte
+per value even if it is compressed, so that files with more values are not measured."""
 
 
 @dataclass
@@ -33,9 +34,9 @@ class Table:
     values : ndarray (columns, rows)
         NaN for empty cells.
     lines : ndarray of int (rows)
-        Line of the file (from 1), or row of the table.
+        For each row, its line in the file or its number in the table, from 1.
     units : list of str or None
-        Units given apart from the names; None if absent.
+        For each column, the unit that the file gives apart from the name; None if it gives none.
     notes : list of str
     """
 
@@ -49,14 +50,14 @@ class Table:
         self.units = self.units or [None] * len(self.names)
 
     def drop(self, places: Sequence[int]) -> None:
-        """Remove columns by index."""
+        """Remove the columns with the indices `places`."""
         keep = [k for k in range(len(self.names)) if k not in places]
         self.names, self.units = [self.names[k] for k in keep], [self.units[k] for k in keep]
         self.values = self.values[keep]
 
 
 def check_size(path: Path, size: int, remedy: str = "", rows: int = 0) -> None:
-    """Raise an error for more numbers than a record may have, or than a file of this size can hold, before reading."""
+    """Raise an error, before reading, for more numbers than a record may have or than a file of this size can hold."""
     if size > MOST_VALUES or rows > MOST_ROWS:
         most = f"{MOST_VALUES} in all, {MOST_ROWS} in a column"
         raise NotAvailable(f"{str(path)!r} has {max(size, rows)} numbers; allowed: up to {most}{remedy}")
@@ -68,14 +69,14 @@ def check_size(path: Path, size: int, remedy: str = "", rows: int = 0) -> None:
 
 
 def check_ambiguous_names(path: Path, found: Sequence[str], kind: str) -> None:
-    """Raise an error if several parts of a file have columns of the same names, so that the choice is ambiguous.
+    """Raise an error if several parts of a file have columns of the same names, so that the user must choose a part.
 
     Parameters
     ----------
     found : sequence of str
         Full names of columns, with parts separated by ``/`` or ``.``.
     kind : str
-        Name of such a part, for the message.
+        What the parts are called in the message, such as group.
     """
     homes: dict[str, list[str]] = {}
     for name in found:
@@ -90,7 +91,7 @@ def check_ambiguous_names(path: Path, found: Sequence[str], kind: str) -> None:
 
 
 def chosen_part(path: Path, kind: str, table: str | None, parts: Sequence[str]) -> str | None:
-    """Part of a file that the option `table` names; None for the whole file.
+    """Name of the part of a file that the option `table` selects; None for the whole file.
 
     Raises
     ------
@@ -103,7 +104,7 @@ def chosen_part(path: Path, kind: str, table: str | None, parts: Sequence[str]) 
 
 
 def from_vectors(path: Path, found: Mapping[str, tuple[Any, str | None]], notes: Sequence[str] = ()) -> Table:
-    """Table of the vectors of the most common length, by name; columns of a matrix get numbers."""
+    """Table of all vectors that have the most common length; the columns of a matrix are named by numbers."""
     vectors: dict[str, tuple[Array, str | None]] = {}
     for name, (values, unit) in found.items():
         array = np.squeeze(np.asarray(values, dtype=float))
@@ -139,7 +140,7 @@ def from_vectors(path: Path, found: Mapping[str, tuple[Any, str | None]], notes:
 
 
 def names_and_units(lines: Sequence[Sequence[str]], count: int) -> tuple[list[str], list[str | None]]:
-    """Names and units of columns from the lines above the numbers; the names are 1, 2, 3 … if there are none."""
+    """Names and units of columns from the lines above the numbers; without lines, the names are 1, 2, 3 …"""
     if not lines:
         return [str(i) for i in range(1, count + 1)], [None] * count
     rows = [([*cells], _as_units(cells)) for cells in lines]
@@ -152,7 +153,7 @@ def names_and_units(lines: Sequence[Sequence[str]], count: int) -> tuple[list[st
 
 
 def _as_units(cells: Sequence[str]) -> list[str | None] | None:
-    """Units of a line that consists of units only; None for other lines."""
+    """Units in the cells of a line, if all its cells are units; else None."""
     plain = [cell.strip("()[] ") for cell in cells]
     units = [known_unit(cell or "1") for cell in plain]
     are_words = any(re.search(r"[^\W\d_]|%|°", cell) for cell in plain)
@@ -160,7 +161,7 @@ def _as_units(cells: Sequence[str]) -> list[str | None] | None:
 
 
 def count_moments(table: Table, place: int) -> None:
-    """Convert a column of times of day or dates to seconds since the first."""
+    """Convert the times of day or dates in a column to seconds since the first of them."""
     table.values[place] = seconds_since_first(table.values[place])
     table.units[place] = "s"
     table.notes.append(f"column {table.names[place]!r} holds times of day or dates; counted in seconds from the first")

@@ -1,4 +1,4 @@
-"""Reader of TDMS files of LabVIEW: channels in groups; without a time channel, times from the sampling interval."""
+"""Reader of TDMS files of LabVIEW: channels in groups; without a time channel, the sampling interval gives the time."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from steadyslip.experiments.measured.formats.table import Table, check_size, cho
 
 UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
 TIME, WANTED = "time", {"friction", "shear"}
-logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # problems are reported by the error alone
+logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # the raised error already reports the problem
 
 
 def read(path: Path, table: str | None) -> Table:
-    """Numeric channels of the named group, or else of the groups that make a record."""
+    """Numeric channels of the group `table` or, without this option, of the groups that make up a record."""
     with path.open("rb") as stream, TdmsFile.open(stream) as file:  # TdmsFile leaves files open that it cannot read
         groups = {group.name: group for group in file.groups() if any(_numeric(c) for c in group.channels())}
         part = chosen_part(path, "group", table, list(groups))
@@ -37,9 +37,10 @@ def read(path: Path, table: str | None) -> Table:
 
 
 def _of_a_record(path: Path, own: dict[str, list[Any]]) -> tuple[list[str], list[str]]:
-    """Groups that make a record, and notes.
+    """Names of the groups that make up a record, and notes.
 
-    They are all groups, if their channels are equally long and have different names; else the only one with friction.
+    These are all groups, if all channels are equally long and have different names; else the only group with a channel
+    of friction or shear stress.
     """
     if len(own) <= 1:
         return list(own), []
@@ -63,7 +64,7 @@ def _numeric(channel: Any) -> bool:
 
 
 def _values(channel: Any) -> Any:
-    """Values of a channel; times as seconds since the first."""
+    """Values of a channel; times are converted to seconds since the first time."""
     values = channel[:]
     if values.dtype.kind == "M":
         return (values - values[0]) / np.timedelta64(1, "s")

@@ -29,21 +29,21 @@ from steadyslip.experiments.measured.formats.table import Table, check_size, cou
 from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook, with_plain_head
 from steadyslip.files.inputs import read_bytes
 
-SHOWN = 8  # damaged lines listed in a message
-HEADER_LINES = 500  # the header ends at two lines of numbers if they are among the first so many; chosen by trial
+SHOWN = 8  # largest number of damaged lines listed in a message
+HEADER_LINES = 500  # within this many lines, the header ends where two lines of numbers follow each other; by trial
 MOST_HEADER, NAMED = 20_000, 500
-"""Most lines above the first numbers; most lines directly above the numbers that may name columns."""
-MOST_TEXT = 2**30  # bytes of a file
-MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines parsed in Python (a minute of CPU time); characters of a line
+"""Largest number of lines above the first numbers; number of lines, just above the numbers, searched for names."""
+MOST_TEXT = 2**30  # largest size of a text file, bytes; its text and cells need a multiple of this memory
+MOST_LINES, MOST_LINE = 2_000_000, 100_000  # most lines parsed in Python (in a minute); most characters of a line
 OTHER_FORMATS = {
     b"\xd0\xcf\x11\xe0": "it is of an old Office program; save it as .xlsx",
     b"PK\x03\x04": "it is a workbook or an archive; save a workbook as .xlsx, unpack an archive",
     b"\x1f\x8b": "it is packed; unpack it",
     b"ARROW1": "it is in Arrow's own format; save it as .parquet",
 }
-"""First bytes of other formats, and advice."""
+"""First bytes of files in other formats, and advice to the user for each format."""
 UTF16 = (b"\xff\xfe", b"\xfe\xff")  # first bytes of UTF-16 text, such as Excel's "Unicode text"
-LARGE, SAMPLE_BYTES = 2**20, 2**17  # bytes above which NumPy is tried first; bytes that its layout is taken from
+LARGE, SAMPLE_BYTES = 2**20, 2**17  # larger texts (bytes) are first tried with NumPy; first bytes that give the layout
 _BEGINS_WITH_NUMBER = re.compile(r"[\s|\"',;]*[-+\u2212]?[.,]?\d")
 _QUOTED = re.compile(r'"[^"]*"')
 _SPLIT_THOUSANDS = re.compile(r"(^|,)[-+]?\d{1,3},\d{3}(\.\d*)?(,|$)")
@@ -103,7 +103,7 @@ def read_text(path: Path, skip_bad_lines: bool, mended: Callable[[bytes], bytes]
 
 
 def _count_all_moments(table: Table, layout: _Layout) -> None:
-    """Convert time columns to seconds; a column of dates is added to a single column of times of day and removed."""
+    """Convert time columns to seconds; dates are added to the times of day, if one column holds these, and removed."""
     clocks = [k for k in layout.moments if k not in layout.days]
     if layout.days and len(clocks) == 1:
         date, clock = table.names[layout.days[0]], table.names[clocks[0]]
@@ -127,7 +127,7 @@ def decoded(raw: bytes) -> tuple[str, list[str]]:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Layout of a text: names, units, separator, columns that are times (and dates), header and body lines."""
+    """Layout of a text: names, units, separator, indices of columns of times and dates, lines of header and body."""
 
     names: list[str]
     units: list[str | None]
@@ -176,7 +176,7 @@ def _check_split(path: Path, header: list[Line], body: list[Line], delimiter: st
 
 
 def _read_with_numpy(path: Path, raw: bytes) -> Table | None:
-    """Table of a large text with nothing but numbers below its header, parsed by NumPy; None if it is not so simple."""
+    """Table of a large text, parsed by NumPy; None if there is anything but numbers below its header."""
     head, notes = decoded(raw[: raw.rfind(b"\n", 0, SAMPLE_BYTES) + 1])
     if not head or head.count("\n") != len(head.splitlines()):
         return None
@@ -210,7 +210,7 @@ def _read_with_numpy(path: Path, raw: bytes) -> Table | None:
 
 
 def delimiter_of(rows: list[Line]) -> str | None:
-    """Column separator; None for blanks."""
+    """Character that separates the columns; None if blanks separate them."""
     middle = [line for _, line in rows[len(rows) // 2 : len(rows) // 2 + 20]]
     sample = [_QUOTED.sub("0", line) for line in middle if _BEGINS_WITH_NUMBER.match(line)]
     sample = sample or [_QUOTED.sub("0", line) for line in middle]
@@ -229,12 +229,12 @@ def delimiter_of(rows: list[Line]) -> str | None:
 
 
 def _is_number(cell: str, mark: str) -> bool:
-    """True for a number with this decimal mark that does not end with a comma."""
+    """True if a cell holds a number with the decimal mark `mark` and does not end with a comma."""
     return number(cell, mark) is not None and not cell.endswith(COMMA)
 
 
 def cells_of(line: str, delimiter: str | None, least: int = 1) -> list[str]:
-    """Cells of a line, without more than `least` trailing empty ones."""
+    """Cells of a line; empty cells at its end are dropped while more than `least` cells remain."""
     if delimiter is None:
         return line.split()
     line = line.rstrip("\r\n")
@@ -257,9 +257,10 @@ def _value(cell: str, mark: str) -> float | None:
 
 
 def _header(rows: list[Line], delimiter: str | None) -> tuple[list[Line], list[Line]]:
-    """Split lines into header and body: at the first line of numbers followed by another, or at the first one.
+    """Lines of the header and of the body, which begins with the first two successive lines of numbers.
 
-    The body is empty if the first `MOST_HEADER` lines hold no numbers.
+    Without two such lines, the body begins with the first line of numbers. It is empty if the first `MOST_HEADER` lines
+    hold no numbers.
     """
     of_numbers = [_holds_numbers(line, delimiter) for _, line in rows[:HEADER_LINES]]
     alone = [k for k, own in enumerate(of_numbers) if own]
@@ -280,7 +281,7 @@ def _holds_numbers(line: str, delimiter: str | None) -> bool:
 
 
 def _usual_count(header: list[Line], body: list[Line], delimiter: str | None) -> int:
-    """Number of columns: that of most lines, or of a header that also names an often empty last column."""
+    """Number of columns: that of most lines, or the larger number in a header that names an often empty last column."""
     counts = [len(cells_of(line, delimiter)) for _, line in body[:200]]
     usual = max(set(counts), key=counts.count)
     if delimiter is not None:
@@ -300,7 +301,7 @@ def _names(
 
 
 def header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
-    """Cells of a header line, which may have another separator than the body; empty if it does not have `count`."""
+    """The `count` cells of a header line, which may be separated otherwise than the body; empty for another number."""
     if delimiter == "|":
         line = line.strip().strip("|")
     if not re.search(r"[^-=+|:\s]", line):
@@ -316,7 +317,7 @@ def header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
 
 
 def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], list[str]]:
-    """Numbers (columns, rows), the line of each row, problems of damaged lines, and notes."""
+    """Numbers (columns, rows), line number of each row, problems in damaged lines, and notes."""
     count = len(layout.names)
     lines, table, faults = [], [], []
     for line_number, line in layout.body:
@@ -350,7 +351,7 @@ def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], 
 
 
 def _row(cells: list[str], marks: list[str], names: list[str]) -> tuple[list[float], str | None]:
-    """Numbers of a line, and a message on its first fault (None if there is none)."""
+    """Numbers in the cells of a line, and a message on the first faulty cell (None if no cell is faulty)."""
     if COMMA not in marks:
         try:
             return [float(cell) for cell in cells], None

@@ -32,16 +32,17 @@ from steadyslip.experiments.measured.formats.table import Table, check_size, cho
 from steadyslip.files.apart import more_time
 
 MOST_PACKED, FEW_BYTES = 60, 2**23
-"""Largest compression ratio of a part (sheets of numbers reach 20); smaller parts than so many bytes may have any."""
-SOME = 2**16  # numbers for which one more second of CPU time is allowed; reading them takes half of it
-MOST_PARTS, MOST_SHEET, MOST_OTHER = 10_000, 2**31, 2**28  # parts of an archive; bytes of a sheet; of any other part
-MOST_COLUMNS = 1000  # of a sheet that are read; chosen by trial
+"""A part of the archive may unpack to the first number times its packed size plus the second number of bytes; sheets of
+numbers reach 20 times."""
+SOME = 2**16  # number of cells for which one more second of CPU time is allowed; reading them takes half of it
+MOST_PARTS, MOST_SHEET, MOST_OTHER = 10_000, 2**31, 2**28  # most parts; most bytes of a sheet, and of another part
+MOST_COLUMNS = 1000  # largest number of columns that are read from a sheet; chosen by trial
 FORMULA = "="
-"""Text that stands for a formula without saved value."""
+"""Text that this module puts in place of a formula without a saved value."""
 MOMENT, DATE, CLOCK, SPAN = 1, 2, 3, 4
-"""Kinds of numbers that are times: date and time of day, date alone, time of day, duration."""
+"""Kinds of times that a number may stand for: date with time of day, date alone, time of day, duration."""
 EPOCHS = {False: 25_569, True: 24_107}  # day number of 1970-01-01: counted from 1900 or, on old Macintoshes, 1904
-TICKS = 5  # decimals of a second to which a date is rounded: a number of days in double precision keeps no more
+TICKS = 5  # dates are rounded to this many decimals of a second: days in double precision are not more precise
 
 
 @dataclass
@@ -53,7 +54,7 @@ class SheetCells:
     lines : ndarray of int (rows)
         Number on the sheet (from 1) of each non-empty row.
     rows, columns, numbers, kinds : ndarray (cells)
-        Index in `lines`, column (from 0), value and kind of time (0: none) of each number; times in seconds.
+        For each number: index in `lines`, column (from 0), value (s for a time) and kind of time (0 for no time).
     text_rows, text_columns : ndarray of int (texts)
     texts : list of str
     """
@@ -68,17 +69,17 @@ class SheetCells:
     texts: list[str]
 
     def counts(self, more: Array) -> Array:
-        """Count of numbers in each column; each column index in `more` counts as one further number."""
+        """Count of numbers in each column; every occurrence of a column's index in `more` is counted as a number."""
         width = 1 + max((int(np.max(one)) for one in (self.columns, self.text_columns) if len(one)), default=-1)
         return np.bincount(self.columns, minlength=width) + np.bincount(more, minlength=width)
 
     def places(self, row: int) -> list[int]:
-        """Indices of the columns with content in a row."""
+        """Indices of the columns that have content in a row."""
         own = (self.columns[self.rows == row], self.text_columns[self.text_rows == row])
         return [int(k) for one in own for k in one]
 
     def words_above(self, row: int) -> list[dict[int, str]]:
-        """Texts of cells (numbers as text) in each row before a given one, by column."""
+        """For each row before `row`, texts of its cells by column; numbers are converted to text."""
         found: list[dict[int, str]] = [{} for _ in range(row)]
         for k in np.flatnonzero(self.rows < row):
             found[self.rows[k]][int(self.columns[k])] = f"{self.numbers[k]:.15g}"
@@ -87,7 +88,7 @@ class SheetCells:
         return [{place: word for place, word in cells.items() if word} for cells in found]
 
     def dense(self, first: int, count: int) -> tuple[Array, Array]:
-        """Values (NaN without a number) and kinds from row `first` on, shape (count, rows) each."""
+        """Values (count, rows), NaN where there is no number, and kinds (count, rows), from row `first` on."""
         shape = (count, len(self.lines) - first)
         own = (self.rows >= first) & (self.columns < count)
         places = (self.columns[own], self.rows[own] - first)
@@ -96,7 +97,7 @@ class SheetCells:
         return values, kinds
 
     def without(self, columns: Array) -> tuple[SheetCells, Array]:
-        """Sheet without some columns, and a mask of the texts that remain."""
+        """Sheet without the columns with the given indices, and mask of the texts that remain."""
         own, texts = (~np.isin(places, columns) for places in (self.columns, self.text_columns))
         rows, text_rows = self.rows[own], self.text_rows[texts]
         left = np.unique(np.concatenate([rows, text_rows]))
@@ -113,7 +114,7 @@ class Workbook:
     Attributes
     ----------
     sheets : dict of str to str
-        Part of the archive by name of the sheet.
+        Name of each sheet, and name of the file in the archive that holds it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -179,7 +180,7 @@ class Workbook:
         )  # fmt: skip
 
     def _content(self, cell: Element) -> tuple[float, int] | str:
-        """Number in a cell with its kind of time, or its text (empty if there is nothing)."""
+        """Number in a cell and kind of time that it stands for, or text in the cell (empty for an empty cell)."""
         kind, said, of_formula = cell.get("t", "n"), "", False
         for part in cell:
             if part.tag.endswith("v"):
@@ -205,7 +206,7 @@ class Workbook:
         return round(DAY * (value - self._origin), TICKS), DATE if value == int(value) else MOMENT
 
     def _styles_of_times(self, part: str) -> Iterator[tuple[str, int]]:
-        """Indices of cell styles that show numbers as times, with the kind of time."""
+        """Pairs of the index of a cell style that shows numbers as times, and the kind of time."""
         own: dict[int, str] = {}
         for one in self._elements(part, ("numFmt", "cellXfs")):
             if _name(one) == "numFmt":
@@ -218,7 +219,7 @@ class Workbook:
                     yield str(place), SPAN if is_timedelta_format(form) else MOMENT
 
     def _links(self, part: str) -> dict[str, tuple[str, str]]:
-        """Relations of a part, by reference: kind and target part."""
+        """Kind and target of each relation from a file of the archive to another, by the relation's identifier."""
         folder, name = posixpath.split(part)
         found = {}
         for one in self._elements(posixpath.join(folder, "_rels", f"{name}.rels"), ("Relationship",)):
@@ -227,7 +228,7 @@ class Workbook:
         return found
 
     def _elements(self, part: str, names: tuple[str, ...], most: int = MOST_OTHER) -> Iterator[Element]:
-        """Elements with some names in a part, each cleared after use; none if the part is absent."""
+        """Elements with the given names in a file of the archive, cleared after use; none if the file is absent."""
         if part not in self._parts:
             return
         about = self._archive.getinfo(part)
@@ -247,18 +248,18 @@ def _name(element: Element) -> str:
 
 
 def _text_of(element: Element) -> str:
-    """Text of an element, of its runs joined, without phonetic hints."""
+    """Text of an element, joined from its parts of different format, without phonetic hints."""
     runs = [part for run in element for part in ([run] if _name(run) == "t" else run if _name(run) == "r" else [])]
     return "".join(part.text or "" for part in runs if _name(part) == "t")
 
 
-SPARSE = 0.05  # share of the fullest column's numbers below which a column does not belong to the record; by trial
-SHORT = 20  # rows below which a sheet has no record (`FEWEST_ROWS`)
+SPARSE = 0.05  # a column with fewer numbers than this share of the fullest column's is no part of the record; by trial
+SHORT = 20  # a sheet with fewer rows holds no record (`FEWEST_ROWS`)
 Stated = list[float | None]
 
 
 def read(path: Path, table: str | None) -> Table:
-    """Table of the named sheet; by default of the only sheet with a record, or else with any numbers."""
+    """Table of the sheet `table`; by default, of the only sheet with a record, or else of the only one with numbers."""
     with Workbook(path) as book:
         part = chosen_part(path, "sheet", table, list(book.sheets))
         names = list(book.sheets) if part is None else [part]
@@ -313,7 +314,7 @@ def _table(path: Path, sheet: SheetCells) -> Table | None:
 
 
 def _check_formulas(path: Path, names: list[str], values: Array, texts: list[list[tuple[int, str]]]) -> None:
-    """Raise an error for columns of formulas without values, written by a program that did not compute them."""
+    """Raise an error for columns of formulas without saved values, which the writing program did not compute."""
     empty = [
         name
         for name, own, column in zip(names, texts, values, strict=True)
@@ -327,7 +328,7 @@ def _check_formulas(path: Path, names: list[str], values: Array, texts: list[lis
 
 
 def _without_side_tables(sheet: SheetCells, stated: Stated) -> tuple[SheetCells, Stated, list[int]]:
-    """Sheet without its sparse columns, the numbers in its remaining texts, and the removed columns with numbers."""
+    """Sheet without sparse columns, numbers that its remaining texts stand for, and removed columns with numbers."""
     is_number = [value is not None or text == FORMULA for value, text in zip(stated, sheet.texts, strict=True)]
     counts = sheet.counts(sheet.text_columns[np.array(is_number, dtype=bool)])
     few = np.flatnonzero(counts < SPARSE * max(counts, default=0))
@@ -340,7 +341,7 @@ def _without_side_tables(sheet: SheetCells, stated: Stated) -> tuple[SheetCells,
 
 
 def _first_row(sheet: SheetCells, stated: Stated) -> int | None:
-    """First row with at least two numbers and no other text; None if there is none."""
+    """Index of the first row with at least two numbers and no other text; None if there is no such row."""
     is_number = np.array([value is not None for value in stated], dtype=bool)
     is_other = ~is_number & np.array([text != FORMULA for text in sheet.texts], dtype=bool)
     own, numbers, reals, others = (
@@ -356,12 +357,12 @@ def _finite(stated: Stated) -> Array:
 
 
 def _text_above(above: list[list[str]], place: int) -> str:
-    """Lowest text above an empty header cell, with which the cell was merged."""
+    """Nearest text above an empty header cell, as the cell may have been merged with it; empty if there is none."""
     return next((cells[place] for cells in reversed(above) if cells[place]), "")
 
 
 def _count_all_moments(found: Table, kinds: Array) -> None:
-    """Convert time columns to seconds; a column of dates is added to a single column of times of day and removed."""
+    """Convert time columns to seconds; dates are added to the times of day, if one column holds these, and removed."""
     own = [kind[np.isfinite(column)] for kind, column in zip(kinds, found.values, strict=True)]
     moments = [k for k, kind in enumerate(own) if len(kind) and np.all(kind[:2] > 0)]
     days = [k for k in moments if np.all(own[k] == DATE)]

@@ -19,7 +19,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 
-MOST_HEAD = 2**14  # bytes of the lines above a text; 32 columns need a tenth
+MOST_HEAD = 2**14  # bytes in which the lines above the numbers of a text file are searched; 32 columns need a tenth
 HEAD, CHANNEL = 36, 84  # bytes of the header and of each channel's description
 LAYOUTS = ((32, 4), (32, 8), (16, 4), (16, 8))  # numbers of channels, and bytes per number
 UNUSED = "no_val"
@@ -31,9 +31,9 @@ NUMBER_KINDS = (">f4", ">f8", "<f4", "<f8")
 
 
 def with_plain_head(raw: bytes) -> bytes:
-    """Text of an XLOOK file with its head replaced by one line of names and one of units, for all columns.
+    """Text of an XLOOK file whose header is replaced by one line of names and one line of units of all columns.
 
-    Other content is returned unchanged. Line numbers do not change.
+    Blank lines keep the line numbers unchanged. Content of other files is returned unchanged.
     """
     found = TEXT_HEAD.match(raw[:MOST_HEAD])
     if found is None:
@@ -50,12 +50,12 @@ def with_plain_head(raw: bytes) -> bytes:
 
 
 def is_xlook(raw: bytes) -> bool:
-    """True if the sizes in the header match the size of the file, or channels are described as XLOOK does."""
+    """True if the header of a binary XLOOK file matches the size of the file or describes channels as XLOOK does."""
     return _size(raw) is not None or _described(raw) is not None
 
 
 def _described(raw: bytes) -> tuple[int, int, int] | None:
-    """Numbers of channels, rows and columns from the header of an XLOOK file of any size; None for other files."""
+    """Numbers of channels, rows and columns from an XLOOK header that need not match the file's size; else None."""
     for channels in dict.fromkeys(channels for channels, _ in LAYOUTS):
         heads = [raw[k : k + 26] for k in range(HEAD, HEAD + channels * CHANNEL, CHANNEL)]
         fields = [_text(part) for head in heads for part in (head[:13], head[13:])]
@@ -110,7 +110,7 @@ def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Ar
     units = [*units, *([None] * columns)][:columns]
     for kind in (kind for kind in NUMBER_KINDS if int(kind[-1]) == width):
         values = np.frombuffer(raw, kind, rows * columns, body).reshape(columns, rows)
-        with np.errstate(invalid="ignore"):  # bytes in the other order may be no numbers
+        with np.errstate(invalid="ignore"):  # bytes read in the wrong order may be no numbers
             found = values.astype(float)
         size_of = np.abs(found[found != 0.0])
         if np.all(np.isfinite(found)) and (not len(size_of) or (size_of.max() < 1e20 and np.median(size_of) > 1e-20)):

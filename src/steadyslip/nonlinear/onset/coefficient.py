@@ -212,5 +212,5 @@ def even_scales(size: Array) -> tuple[Array, Array]:
 
 
 def _inverse(value: Array) -> Array:
-    """Reciprocal; 1 where the value is not positive."""
+    """Reciprocal of `value`; 1 where `value` is not positive."""
     return 1 / np.where(value > 0, value, 1.0)

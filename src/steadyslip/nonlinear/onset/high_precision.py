@@ -22,7 +22,7 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.taylor import EPS, Index, arrangements, system
 from steadyslip.nonlinear.onset.coefficient import even_scales
 
-DIGITS = 50  # three times those of double precision: products of three such numbers are exact
+DIGITS = 50  # decimal digits, three times those of double precision: products of three doubles are exact
 SETTLED = mpmath.mpf("1e-30")
 """Relative Newton step at which the iteration stops: the next step would be smaller by the digits of the matrix."""
 STEPS = 40
@@ -35,7 +35,7 @@ Numbers = list[Any]
 
 
 class _NoConvergence(ArithmeticError):
-    """Newton's method does not converge: the edge is not a simple one."""
+    """Error: Newton's method does not converge, because the critical eigenvalue is multiple."""
 
 
 def coefficient(
@@ -102,7 +102,7 @@ def _steady_residuals(model: Model) -> list[sp.Expr]:
 
 @cached
 def _linear(model: Model) -> tuple[sp.Expr, ...]:
-    """First derivatives of the model, residuals of steady sliding, and slip rates (cached)."""
+    """Expressions of the model's first derivatives, of the residuals of steady sliding, and of slip rates (cached)."""
     found = system(model)
     speeds = [model.steady[contact.velocity] for contact in model.contacts]
     return (*found.expressions[: len(found.entries[0])], *_steady_residuals(model), *speeds)
@@ -110,14 +110,17 @@ def _linear(model: Model) -> tuple[sp.Expr, ...]:
 
 @cached
 def _functions(model: Model) -> tuple[ArrayFunction, PreciseFunction, PreciseFunction]:
-    """Compiled functions: `_linear` in double precision and in fifty digits, higher derivatives in fifty (cached)."""
+    """Three compiled functions: `_linear` in double precision and to fifty digits, and higher derivatives (cached).
+
+    Higher derivatives are computed to fifty digits.
+    """
     higher = system(model).expressions[len(system(model).entries[0]) :]
     linear = _linear(model)
     return model.function(linear), PreciseFunction(model.arguments, linear), PreciseFunction(model.arguments, higher)
 
 
 class _Rig:
-    """One rig near its edge, solved in fifty digits for steady sliding, edge and eigenvector together."""
+    """One rig near its edge; steady sliding, edge and eigenvector are solved for together, to fifty digits."""
 
     def __init__(self, point: OperatingPoint, along: str, omega: float, contact: int, vector: Array) -> None:
         self.model, self.contact = point.model, contact
@@ -215,7 +218,7 @@ class _Rig:
         return np.concatenate([above, below.real, below.imag])
 
     def _entries(self, found: Numbers) -> list[tuple[int, int, Any]]:
-        """Entries (row, column, value) of the gradient."""
+        """Non-zero entries (row, column, value) of the matrix of first derivatives."""
         return [(i, j, e) for (i, j), e in zip(self.system.entries[0], found, strict=False)]
 
     def _higher(self, found: Numbers) -> tuple[Callable[..., Numbers], Callable[..., Numbers]]:

@@ -30,8 +30,8 @@ from steadyslip.nonlinear.continuation import Failure, Point, SolutionCurve, tur
 from steadyslip.nonlinear.onset.coefficient import coefficients
 from steadyslip.nonlinear.onset.hopf import onsets
 
-DECADES = 6.0  # default range of a parameter: decades to each side of the rig's value
-SMALLEST_FREQUENCY = 1e-4  # frequency over that at the start, below which the edge counts as one of divergence
+DECADES = 6.0  # default range of a parameter: this many decades to each side of the rig's value
+SMALLEST_FREQUENCY = 1e-4  # share of the frequency at the start below which the edge counts as one of divergence
 
 
 @dataclass(frozen=True)
@@ -276,7 +276,7 @@ class _Plane:
 
 
 def _followed(curve: SolutionCurve, start: Point, plane: _Plane, spacing: float) -> tuple[list[Point], str]:
-    """Points of the curve from `start` (not among them) along its tangent, and the reason for its end.
+    """Points of the curve that follow `start` along its tangent, and the reason for which the curve ends.
 
     Where the curve leaves the range of a parameter, the last point lies on the limit.
     """

@@ -25,9 +25,9 @@ from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.ranges import Neighbour, checks_of, is_open
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer, orbit_of
 
-MOST_STEPS_BETWEEN = 40  # continuation steps between two neighbours on a branch
-PERIODS = 4  # simulated: recurrence needs a third slip event, which begins two periods after the start
-ASIDE = 1e-2  # initial distance of a motion from an unstable cycle, in shooting unknowns
+MOST_STEPS_BETWEEN = 40  # limit of continuation steps between two neighbouring cycles on a branch
+PERIODS = 4  # simulated periods: a recurrence time needs a third slip event, two periods after the start
+ASIDE = 1e-2  # initial distance of a simulated motion from an unstable cycle, in shooting unknowns
 
 
 def tracer_of(onset: Onset, steady: int, rtol: float | None) -> Tracer:
@@ -69,7 +69,7 @@ class Simulation:
     cycle : Cycle or None
         Stable cycle that the motion approaches; None if it settles, ends, or does not repeat within the simulated time.
     multiple : float
-        Period of `cycle` over that of the unstable cycle beside which the motion began; NaN without one of these.
+        Period of `cycle` over that of the unstable cycle near which the motion began; NaN if either is missing.
     """
 
     start: str
@@ -120,7 +120,7 @@ class CyclesAt(tuple[Cycle, ...]):
         return self
 
     def with_sentence(self, sentence: str) -> CyclesAt:
-        """Copy with a sentence on the slip events."""
+        """Copy of these cycles with a sentence on the slip events."""
         copy = CyclesAt(self, self.multiples, self.missed, self.simulated, self.between, self._window)
         copy.sentence = sentence
         return copy
@@ -213,7 +213,7 @@ def _at_value(tracer: Tracer, low: Cycle, high: Cycle, value: float) -> Cycle | 
 
 
 def _closed(tracer: Tracer, cycle: Cycle) -> Cycle:
-    """The cycle; solved again from a simulated motion if it is stable and its closing error too large."""
+    """The cycle itself; if it is stable and its closing error too large, the cycle solved from a simulated motion."""
     if not (is_open(cycle) and cycle.stable):
         return cycle
     again = motion_from(tracer.flow, orbit_of(cycle).states[0], cycle.value, attracts=True).cycle

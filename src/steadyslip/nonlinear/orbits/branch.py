@@ -57,14 +57,15 @@ class CycleBranch(Displayed):
     rtol : float or None
         Relative error allowed per integration step, as given to `steadyslip.cycles`.
     contact : str
-        Of a machine whose branch ends where a contact is lost, or with a blow-up: the contact that lifts off, or that
-        is the fastest; else empty.
+        For a machine whose branch ends with loss of contact or a blow-up: the contact that lifts off, or the fastest
+        contact; else empty.
     bounds : tuple of (End, End)
         Where each part between two gaps begins and stops.
     repeated : int
         Number of cycles that were computed again with smaller errors per step, because a check failed.
     not_followed : tuple of (End, str)
-        Ends from which no cycles were followed, and why: integration steps were used up, or no cycle was found.
+        Ends from which no cycles were followed, each with the reason: integration steps were used up, or no cycle was
+        found.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -93,7 +94,8 @@ class CycleBranch(Displayed):
     def __getitem__(self, name: str) -> Array:
         """One quantity along the branch: ``value``, ``period``, ``peak_velocity``, ``stress_drop``, ...
 
-        For a machine ``force_drop`` and so on, at the contact of its cycles; at another ``guide.peak_velocity``.
+        For a machine ``force_drop`` and so on refer to the contact of its cycles; for another contact, its name comes
+        first, as in ``guide.peak_velocity``.
         """
         own, columns = quantities(self.rig), self._of_contacts()
         if name in columns:
@@ -130,7 +132,7 @@ class CycleBranch(Displayed):
         levels = list[CycleBranch]()
         while branch is not None:
             here, gaps = cycles_at(self.onset, self.steady, self.rtol, value, branch._continuous())
-            here = [one for one in here if not any(map(one.is_like, found))]  # parts of doubled branches may coincide
+            here = [one for one in here if not any(map(one.is_like, found))]  # parts of a doubled branch may overlap
             found, multiples = found + here, multiples + len(here) * [2 ** len(levels)]
             missed += [f"a cycle {self._between(*ends)} could not be computed" for ends in gaps]
             levels.append(branch)
@@ -176,7 +178,7 @@ class CycleBranch(Displayed):
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
-        """Stretches of cycles of equal stability, in the order of the branch; they end at bifurcations."""
+        """Stretches of consecutive cycles of equal stability, in the order of the branch; they end at bifurcations."""
         return tuple(stretches_of(self.cycles, self.special, self.gaps, self.bounds))
 
     @property
@@ -268,19 +270,19 @@ class CycleBranch(Displayed):
 
     @property
     def swing_label(self) -> str:
-        """Label of `swings`, which differ from the stress drops of slip events in a simulation."""
+        """Label of `swings`, whose values differ from the stress drops of slip events in a simulation."""
         if self.cycles and self._lever(self.cycles[0]) is not None:
             return "torque swing"
         return stress_name(self.rig.result_name("stress swing"), self.rig.area)
 
     def swings(self) -> tuple[Array, str]:
-        """Highest minus lowest pull in each cycle, and its unit: Pa, for a machine N, at a body that turns N m."""
+        """Highest minus lowest pull in each cycle, and its unit: Pa; N for a machine, or N m at a body that turns."""
         levers = [self._lever(one) for one in self.cycles]
         unit = "N m" if any(one is not None for one in levers) else self.rig.result_unit("Pa")
         return np.array([one.stress_drop * (by or 1.0) for one, by in zip(self.cycles, levers, strict=True)]), unit
 
     def _lever(self, cycle: Cycle) -> float | None:
-        """Radius (m) of the contact of a cycle if its body turns, else None; the radius may be the free parameter."""
+        """Radius (m) of the contact of a cycle if the body turns, else None; the radius may be the varied parameter."""
         lever = self.rig.lever_at(cycle.contact) if cycle.contact else None
         return cycle.value if lever is not None and self.along == f"contacts.{cycle.contact}.radius" else lever
 

@@ -37,7 +37,7 @@ class BranchPiece:
 
     @property
     def bounds(self) -> tuple[End, End]:
-        """Ends at which the piece begins and stops."""
+        """The two ends of the piece: where it begins, and where it stops."""
         ends = []
         for end, i in ((self.begins, 0), (self.stops, -1)):
             if end is None and self.points:
@@ -46,7 +46,7 @@ class BranchPiece:
         return ends[0], ends[1]
 
     def reversed(self) -> BranchPiece:
-        """The piece with its cycles in reverse order."""
+        """Copy of the piece with its cycles in reverse order."""
         count = len(self.points)
         special = [replace(one, index=count - one.index) for one in reversed(self.special)]
         return BranchPiece(self.points[::-1], special, self.end, self.whole, self.contact, self.stops, self.begins)

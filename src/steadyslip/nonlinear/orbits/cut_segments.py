@@ -12,13 +12,13 @@ from steadyslip.core.arrays import Array
 from steadyslip.kernels.layout import Recorded
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
-NODES = 48  # number of candidates for the start of a segment
-MOST_GROWTH = 1e3  # largest growth of deviations within a segment (ratio)
-QUICK = 30.0  # speed of the state, over its mean in the cycle, above which no cut is made
+NODES = 48  # number of states along the cycle at which a segment may start
+MOST_GROWTH = 1e3  # largest allowed factor by which deviations grow within a segment
+QUICK = 30.0  # no cut is made where the state changes faster than this multiple of its mean rate in the cycle
 
 
 def cut(shooting: Shooting, u: Array) -> Orbit | None:
-    """The orbit divided into new segments; None if there would be no more of them than now.
+    """The orbit divided into new segments; None if there would not be more segments than now.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def cut(shooting: Shooting, u: Array) -> Orbit | None:
 
 
 def _nodes(shooting: Shooting, orbit: Orbit) -> tuple[Array, Array]:
-    """Times (s) and states of candidate cuts: evenly spaced along the cycle in the unknowns, where motion is slow."""
+    """Times (s) and states at which cuts are possible: evenly spaced in the unknowns, where motion is slow."""
     flow = shooting.flow
     setting = flow.setting(orbit.value)
     times, states = [], []

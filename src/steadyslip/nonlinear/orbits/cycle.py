@@ -26,9 +26,9 @@ def quantities(rig: Rig) -> dict[str, tuple[str, str]]:
 
 OPEN = 1e-4  # largest allowed closing error, as a share of the cycle's size; Newton's method leaves a tenth of it
 IMPRECISE = 1e-3  # error of the trivial multiplier beyond which a cycle is rejected
-RETURNED = 1e-5  # largest distance between returns of a motion, a period apart, that proves an attracting cycle
-ALIKE = 1e-6  # largest relative difference between copies of one cycle; Newton's method leaves less
-UNCERTAIN = 3.0  # assumed ratio of the errors of other multipliers to that of the trivial one
+RETURNED = 1e-5  # a cycle attracts if states of a simulated motion one period apart differ by less than this
+ALIKE = 1e-6  # two cycles are the same if they differ by less than this (relative); Newton's method leaves less
+UNCERTAIN = 3.0  # errors of other multipliers are assumed to be up to this multiple of that of the trivial multiplier
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class Cycle(Displayed):
     amplitude : float
         Half of ln(peak velocity/lowest velocity); infinite where the block stops or reverses.
     stress_drop : float
-        Highest minus lowest spring stress in a period, Pa; the `stress_drop` of a `SlipEvent` ends where the block
-        first rests, and is smaller where later ringing reaches a lower stress.
+        Highest minus lowest spring stress in a period, Pa. The `stress_drop` of a `SlipEvent` counts only until the
+        block first rests, and is smaller if later ringing reaches a lower stress.
     lowest_normal_stress, highest_normal_stress : float
         Extreme normal stresses, Pa.
     multipliers : tuple of complex
@@ -82,20 +82,20 @@ class Cycle(Displayed):
         True if the cycle attracts: all multipliers inside the unit circle.
     start : dict of str to float
         State at which the block, accelerating, is as fast as the load point: x, memory and, with mass, v, SI units, for
-        ``simulate(rig, initial=...)``. Of a machine: at which `contact` slips as fast as in steady sliding.
+        ``simulate(rig, initial=...)``. For a machine: the state at which `contact` slips as fast as in steady sliding.
     speed : float
         Slip rate in steady sliding, m/s.
     contact : str
-        Of a machine: the contact at which periods begin and numbers refer to; else empty.
+        For a machine: the contact to which start and numbers of the cycle refer; else empty.
     contacts : dict of str to CycleRange
-        Of a machine: extremes at each contact, by name.
+        For a machine: extremes at each contact, by name.
     closing : float
         Closing error: distance between start and end of one period, integrated without sensitivities, as a share of
         the cycle's size (logarithms of large states, multiples of natural sizes of small ones); or the error of the
         period, as a share of it, if that is more.
     returned : float
-        For a cycle found by simulation: largest distance between states a period apart over its last two periods,
-        measured as `closing`; else NaN.
+        For a cycle found by simulation: largest distance between states one period apart in the last two simulated
+        periods, measured as `closing` is; else NaN.
     """
 
     value: float
@@ -129,7 +129,7 @@ class Cycle(Displayed):
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """Checks that the motion closes after a period, and that the largest multiplier differs from 1 by its error."""
+        """Checks that the motion closes after a period, and that the largest multiplier clearly differs from 1."""
         room = abs(self.growth - 1) / (UNCERTAIN * self.growth) if self.growth else IMPRECISE
         stability = check(
             "its stability", "the multiplier along the motion is 1", self.multiplier_error, min(IMPRECISE, room)
@@ -159,9 +159,9 @@ class SpecialCycle(Displayed):
         ``fold``, ``period doubling``, ``torus``, or ``branch point`` (a multiplier passes 1 without a fold).
     cycle : Cycle
     bracket : tuple of float
-        Values of the parameter on both sides (at a fold: of neighbouring cycles).
+        Values of the parameter on both sides; at a fold, values of the neighbouring cycles.
     precision : float
-        Estimated error of the parameter's value there, relative.
+        Estimated relative error of the parameter's value at the bifurcation.
     index : int
         Index of the branch's cycle that follows it.
     """

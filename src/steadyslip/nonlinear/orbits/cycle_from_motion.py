@@ -24,13 +24,13 @@ from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 
 PRIMES = np.array(
     [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31]
-)  # numbers of turns of a shorter cycle that are tested; others are products
-STEEPER = 3.0  # ratio of accelerations above which another passage becomes the start of the cycle; chosen by trial
+)  # numbers of repetitions of a shorter cycle that are tested; other numbers are products of these
+STEEPER = 3.0  # a passage with an acceleration this many times larger becomes the start of the cycle; by trial
 SAME = 1e-4  # distance, as a share of the cycle's size, within which a state counts as returned
 
 
 def amplitude(velocity: Array) -> float:
-    """Half of ln(highest/lowest) of slip rates; infinite where the block stops or reverses."""
+    """Half of ln(highest slip rate/lowest slip rate); infinite where the block stops or reverses."""
     high, low = float(velocity.max()), float(velocity.min())
     if not low > 0:
         return np.inf
@@ -63,7 +63,7 @@ class CycleData:
     ----------
     cycle : Cycle
     turns : int
-        Number of times that the period contains a shorter one, or a prime factor of that number, up to 31; 1 for a
+        Number of times that the period contains a shorter period, or a prime factor of that number, up to 31; 1 for a
         primitive cycle.
     half : ndarray (n,)
         Change of the state from the start to half the period, in natural sizes.
@@ -71,8 +71,8 @@ class CycleData:
         Range of each state variable in the cycle.
     begin : Orbit or None
         Approximate orbit of the cycle that starts where slip passes the load point's velocity with the largest
-        acceleration; None unless that is `STEEPER` times the present one. A start at which slip only just reaches that
-        velocity disappears a little further along the branch.
+        acceleration; None unless this acceleration is `STEEPER` times that at the present start. A start at which slip
+        only just reaches the load point's velocity disappears a little further along the branch.
     """
 
     cycle: Cycle
@@ -112,7 +112,7 @@ def cycle_data(shooting: Shooting, u: Array) -> CycleData:
             start = _start(flow, flow.observed(setting, first[:, Recorded.TIME], first[:, Recorded.POINT :]))
     each = [tuple(map(np.concatenate, zip(*parts, strict=True))) for parts in zip(*passed, strict=True)]
     if not all(np.all(np.isfinite(column)) for columns in each for column in columns):
-        raise FlowFailure("stuck")  # forces do not balance at every state
+        raise FlowFailure("stuck")  # at some state of the cycle no velocity balances the forces
     ranges = [_range(*columns) for columns in each]
     own = ranges[flow.contact]
     names = [contact.name for contact in flow.reduction.model.contacts]
@@ -145,7 +145,9 @@ def cycle_data(shooting: Shooting, u: Array) -> CycleData:
 
 
 def closing_error(missed: Array, along: Array, period: float, amplitude: float) -> float:
-    """Closing error of a cycle: distance across it as a share of its size, or in time as a share of the period.
+    """Closing error of a cycle: distance between its start and end as a share of its size, or error of the period.
+
+    The larger of the two is returned, the error of the period as a share of the period.
 
     The part of the distance along the motion is converted to a time: where slip begins after a long rest, a tiny error
     of the period grows to most of the cycle's size a moment later.
@@ -187,11 +189,11 @@ class _Begin:
 
 
 BEGINS = LOG_KINDS.index("slip begins")  # slip event begins: the block, accelerating, is as fast as the load point
-RINGS = 8  # assumed passages per slip event, ringing included
+RINGS = 8  # assumed number of passages per slip event, those of ringing included
 RETURNS = 17  # number of returns that are compared: cycles with up to 16 returns per period are found
 NEAR = 0.1  # largest distance from the motion to the solution, as a share of the cycle's size
-CLOSE = 0.05  # largest distance of two returns a period apart, as a share of the motion's size
-SMALLEST = 1e-5  # range, in natural sizes, below which a motion counts as steady sliding
+CLOSE = 0.05  # largest distance of two returns one period apart, as a share of the motion's size
+SMALLEST = 1e-5  # a motion whose range is smaller than this, in natural sizes, counts as steady sliding
 MOST_TRIES = 4  # limit of numbers of returns per period that are tried
 FIRST_SPAN = 60.0  # duration of the first simulation, natural times
 MOST_STEPS = 40_000  # limit of integration steps per stretch of motion
@@ -200,7 +202,7 @@ MOST_STEPS = 40_000  # limit of integration steps per stretch of motion
 def cycle_near(
     runs: FlowRunner, state: Array, value: float = 0.0, patience: int = 1, unknowns: Array | None = None
 ) -> Cycle | None:
-    """Cycle that a motion is on or approaches, or None.
+    """Cycle on which a motion is, or which it approaches; None if there is none.
 
     Parameters
     ----------
@@ -227,9 +229,9 @@ def motion_from(
     runs: FlowRunner, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
     unknowns: Array | None = None,
 ) -> Simulated:  # fmt: skip
-    """Cycle that a motion from a state approaches, or None, and a description of the motion.
+    """Cycle that the motion from `state` approaches (None if there is none), and a description of the motion.
 
-    Parameters are those of `cycle_near`; with `attracts` unstable cycles are skipped.
+    Parameters are those of `cycle_near`; if `attracts` is True, unstable cycles are skipped.
     """
     returns, low, high = 0, np.inf, -np.inf
     try:
@@ -297,7 +299,7 @@ def _stretches(
             sticks = sticks or len(slips.times) > 0
             state, unknowns = outcome.state[0], outcome.unknowns[0]
             now, spent = now + span, spent + len(record)
-            returned = len(slips.times) if sticks else len(passes.times)  # not ringing
+            returned = len(slips.times) if sticks else len(passes.times)  # without those due to ringing
             span *= 2.0 if returned < RETURNS // 2 else 1.0
         seen = slips if len(slips.times) > 1 and _since(slips, passes) < RINGS * RETURNS else passes
         times, states = seen.times[-RETURNS:], seen.states[-RETURNS:]
@@ -331,7 +333,7 @@ def _enough(slips: _Returns, passes: _Returns, sticks: bool) -> bool:
 
 
 def _since(slips: _Returns, passes: _Returns) -> int:
-    """Number of passages after the last slip event."""
+    """Number of `passes` after the last of `slips`, the starts of slip events."""
     last = slips.times[-1] if slips.times else -np.inf
     return int(np.sum(np.array(passes.times) > last))
 
@@ -342,18 +344,18 @@ def _ends(speeds: list[Array]) -> tuple[float, float]:
 
 
 def _candidates(runs: FlowRunner, seen: _Stretch) -> Array:
-    """Numbers of returns that a period may have: so many returns ago the motion was close to its last state."""
+    """Possible numbers of returns per period: that many returns ago the motion was close to its last state."""
     places = np.arcsinh(seen.states / runs.scales)
     away = np.abs(places[-2::-1] - places[-1]).max(axis=1)
     return 1 + np.flatnonzero(away < CLOSE * min(1.0, seen.extent))[:MOST_TRIES]
 
 
 def _solved(runs: FlowRunner, value: float, seen: _Stretch, back: int) -> Cycle | None:
-    """Cycle next to the last return, with `back` returns per period; None if Newton's method finds none."""
+    """Cycle near the last return with `back` returns per period; None if Newton's method finds none."""
     shooting = Shooting(runs, np.ones(1), False, abs(value) or 1.0)
     shooting.amplitude = min(1.0, seen.extent)
     period = seen.times[-1] - seen.times[-1 - back]
-    if not period > 0:  # returns within rounding of each other
+    if not period > 0:  # the two returns differ by rounding only
         return None
     runs.begin_motion()
     guess = shooting.packed(Orbit(seen.states[-1:], period, value))
@@ -370,7 +372,7 @@ def _solved(runs: FlowRunner, value: float, seen: _Stretch, back: int) -> Cycle 
 
 
 def _returned(runs: FlowRunner, seen: _Stretch, back: int) -> float:
-    """Largest distance between returns of the motion a period apart, over the last two periods; NaN if it had fewer.
+    """Largest distance between returns one period apart, over the last two periods; NaN for less than two periods.
 
     Where a bristle rings between long rests, deviations grow and shrink by many decades within a period, so that
     multipliers are inaccurate, but the simulated motion is not.

@@ -16,7 +16,7 @@ from steadyslip.nonlinear.orbits.special import BranchPoint, lies_between
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, USED_UP, Tracer, orbit_of
 
 SEEDS = (0.003, 0.03, 0.2, 0.6)  # parameter values of simulations: shares of the way from the break to the range's end
-AHEAD = 2.0  # initial displacement of a motion beside steady sliding, natural sizes of slip
+AHEAD = 2.0  # initial displacement of a motion that starts near steady sliding, in natural sizes of slip
 PATIENCE = 12  # number of stretches (see `cycle_from_motion`) within which a motion has to reach a cycle
 
 
@@ -49,7 +49,7 @@ def search_on(tracer: Tracer, pieces: list[BranchPiece]) -> None:
 
 
 def _crossed(piece: BranchPiece, tracer: Tracer) -> bool:
-    """True if a piece ends for a physical reason other than reaching the limit of the range on the stable side."""
+    """True if a piece ends for a physical reason; the limit of the range counts only on the unstable side."""
     if not piece.whole or not piece.points:
         return False
     if not piece.end.startswith("end of the range"):
@@ -83,10 +83,10 @@ def _add_piece(tracer: Tracer, pieces: list[BranchPiece], seed: BranchPoint, awa
     if not tracer.interrupted:
         ahead = tracer.followed(forth.shooting, forth, step)
     both = behind.reversed()
-    both.points.pop()  # the seed, which `ahead` begins with
+    both.points.pop()  # the seed, with which `ahead` begins
     both = both.joined(ahead) if ahead.points else behind.reversed()
     near = behind.points[-1].cycle
-    if behind.end == "" and behind.whole:  # met
+    if behind.end == "" and behind.whole:  # `behind` has met a known piece
         cut_back(pieces[-1], near)
         pieces[-1] = pieces[-1].joined(both)
     elif behind.end.startswith("back") and abs(near.value / tracer.onset.value - 1) < 1e-3 and near.amplitude < 0.5:
@@ -102,7 +102,7 @@ def met(pieces: list[BranchPiece], known: BranchPoint) -> bool:
 
 
 def cut_back(piece: BranchPiece, meeting: Cycle) -> None:
-    """Remove the cycles of a piece that follow the neighbours of `meeting`, at which another piece met it."""
+    """Remove the cycles of a piece beyond the neighbours of `meeting`, the cycle at which another piece met it."""
     for i in range(len(piece.points) - 1):
         if lies_between(piece.points[i].cycle, piece.points[i + 1].cycle, meeting):
             del piece.points[i + 1 :]

@@ -17,13 +17,13 @@ from steadyslip.nonlinear.orbits.cycle import IMPRECISE, Cycle, End, SpecialCycl
 from steadyslip.nonlinear.orbits.parameter_flow import Flow
 from steadyslip.nonlinear.orbits.special import MET, ROUNDING, SMALL, BranchPoint, lies_between
 
-WINDINGS = 6  # number of folds, each closer to the next, after which a branch winds round one value
-STANDING = 12  # number of cycles within 5 %, at one parameter value up to rounding, after which a branch ends
+WINDINGS = 6  # number of folds at ever smaller distances after which a branch counts as winding round one value
+STANDING = 12  # a branch ends after this many cycles that differ by less than 5 % at one parameter value
 RETRACED = 4  # number of consecutive cycles between known neighbours after which the branch has turned back
-TOO_UNSTABLE = 1e8  # growth of deviations in a period that loses half the digits of double precision
-SHRUNK = 0.5  # amplitude of ln v below which a cycle may be about to shrink to steady sliding
-LARGE = 1e6  # peak velocity over the drive's beyond which a cycle counts as growing without bound
-STILL = 1e-3  # relative change of value and period, over that of the peak velocity, below which they are constant
+TOO_UNSTABLE = 1e8  # largest growth of deviations in a period: more loses half of the digits of double precision
+SHRUNK = 0.5  # only a cycle with a smaller amplitude of ln v may be about to shrink to steady sliding
+LARGE = 1e6  # a cycle counts as growing without bound if its peak velocity exceeds this multiple of the drive's
+STILL = 1e-3  # value and period are constant if they change by less than this share of the peak velocity's change
 ENDS = {
     "blow-up": "blow-up: the velocity of the massless model becomes infinite; give the {block} a mass or {damping} to "
     "follow the cycles further",
@@ -99,7 +99,8 @@ class EndRules:
     def slows(self, now: BranchPoint) -> bool:
         """True if slip decelerates where the cycle starts: the continuation has passed a cycle of zero size.
 
-        With mass, rounding of the state may dominate its acceleration; that carried round the cycle once is accurate.
+        With mass, rounding of the state may dominate the acceleration computed at the start. The acceleration carried
+        round the cycle once by the sensitivities is accurate, so both have to be negative.
         """
         orbit = now.shooting.orbit(now.point.u)
         setting = self.flow.setting(orbit.value)
@@ -154,7 +155,7 @@ def retraces(known: list[Cycle]) -> bool:
 
 
 def _sized(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
-    """True if the amplitude of a cycle lies between those of two neighbours."""
+    """True if the amplitude of a cycle lies between the amplitudes of the cycles `a` and `b`."""
     *ends, size = (float(np.log(min(one.amplitude, LARGE))) for one in (a, b, cycle))
     spread = MET + 0.3 * (ends[1] - ends[0]) ** 2
     return min(ends) - spread < size < max(ends) + spread

@@ -37,11 +37,11 @@ DONE = WORDS.index("done")
 NEVER = np.empty(0)
 STIFF = "rodas5p"  # Rosenbrock method of order 5, as tolerances are tight
 MOST_STEPS = 100_000  # limit of integration steps of one run: some tenths of a second
-FAR_MORE, FEW_STEPS = 20, 5_000  # limit of steps of a run: factor on those of the last run, and least limit
-MORE = 8  # as FAR_MORE, for a run close to a known one
-QUICKER = 4  # ratio of the times of a step with and without sensitivities, for machines of three bodies
-HARDLY_HEARD = 1e6  # factor on the tolerances of sensitivities, so that they hardly affect step sizes
-UNHEARD = 1e12  # as HARDLY_HEARD, so that they do not affect step sizes
+FAR_MORE, FEW_STEPS = 20, 5_000  # limit of steps of a run: FAR_MORE times those of the last run, at least FEW_STEPS
+MORE = 8  # used instead of FAR_MORE for a run close to a known run
+QUICKER = 4  # assumed ratio of the times of a step with and without sensitivities: that of machines with three bodies
+HARDLY_HEARD = 1e6  # factor on the tolerances of sensitivities with which they hardly affect step sizes
+UNHEARD = 1e12  # factor on the tolerances of sensitivities with which they do not affect step sizes
 NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are reused
 KINDS_EACH = len(LOG_KINDS) - 2  # number of event kinds at one contact
 
@@ -58,7 +58,7 @@ class FlowFailure(Failure):
 
     @property
     def place(self) -> str:
-        """Status, for machines followed by the contact concerned."""
+        """Text of the status; for machines the contact concerned follows it."""
         return f"{self.status} at {self.contact}" if self.contact else self.status
 
 
@@ -176,7 +176,7 @@ class FlowRunner:
 
     @property
     def led(self) -> bool:
-        """True where step sizes follow the error of the motion, not that of the sensitivities."""
+        """True if the error of the motion, and not that of the sensitivities, decides step sizes."""
         return self.slack > 1.0
 
     @property
@@ -206,7 +206,10 @@ class FlowRunner:
         self, point: OperatingPoint, inputs: Array, value: float = 0.0, unit: float = 1.0,
         rates: tuple[Array, Mapping[sp.Symbol, Array]] | None = None,
     ) -> FlowSetting:  # fmt: skip
-        """Setting at an operating point; `rates`: derivatives of constants and inputs in the parameter, per `unit`."""
+        """Kernel tables of the rig at an operating point, with inputs (3,).
+
+        `rates` are derivatives of the constants and inputs with respect to the free parameter, per `unit` of it.
+        """
         constants = self.machine.constants(point)
         settings = self._settings_at(point, value)
         scales, behind = settings[0, self.tolerances], self.tolerances.stop
@@ -232,7 +235,7 @@ class FlowRunner:
     # -- runs
 
     def begin_motion(self) -> None:
-        """Reset the limit of steps: the next run is of another motion than the last, perhaps far longer."""
+        """Reset the limit of steps, because the next run is of another motion, which may be far longer."""
         self._usual = MOST_STEPS
 
     def run(
@@ -259,7 +262,7 @@ class FlowRunner:
             usual, self.slack = self.slack, UNHEARD
             try:
                 final = self._advanced(setting, self._sensitive_settings(setting, amplitude), initial, times)
-            except FlowFailure:  # the motion itself needs the steps: mostly a point far off the curve
+            except FlowFailure:  # the motion alone needs as many steps: mostly at a point far from the curve
                 self.slack = usual
                 raise
         matrix = final[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
@@ -287,7 +290,7 @@ class FlowRunner:
         return np.tile(np.append(np.eye(self.size).ravel(), np.zeros(self.size)), (count, 1))
 
     def _finer(self, settings: Array, amplitude: float) -> Array:
-        """Settings with absolute tolerances reduced in proportion to a small amplitude."""
+        """Kernel settings with absolute tolerances reduced in proportion to `amplitude`, if that is small."""
         finer = settings.copy()
         finer[:, self.tolerances] *= max(min(1.0, amplitude), self.finest)
         finer[:, SETTINGS.index("watch")] = finer[:, SETTINGS.index("record")] = 0.0

@@ -33,7 +33,7 @@ from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, USED_UP, Tracer, orb
 SMALLEST = 1e-12  # smallest amplitude of ln v: some thousand roundings of the velocity
 FINER, FINEST = 1e-2, 1e-13  # factor on rtol for recomputed cycles, and the smallest rtol above rounding
 MOST_REPEATED = 40  # largest number of recomputed cycles: where more fail, the user should ask for a smaller rtol
-LARGER = (1e-4, 1e-3, 1e-2, 1e-1)  # amplitudes of ln v to begin with where smaller cycles cannot be followed
+LARGER = (1e-4, 1e-3, 1e-2, 1e-1)  # amplitudes of ln v of the first cycle, tried if smaller cycles cannot be followed
 
 
 @checked(
@@ -149,7 +149,7 @@ def _branch(tracer: Tracer, pieces: list[BranchPiece], rtol: float | None, doubl
 
 
 def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
-    """All cycles, those whose checks fail computed again with a smaller error per step, and the number replaced."""
+    """The cycles, and how many of them were replaced: cycles that fail a check are computed again more accurately."""
     failing = [i for i, cycle in enumerate(found) if is_open(cycle) or is_undecided(cycle)][:MOST_REPEATED]
     if not failing or tracer.interrupted:
         return found, 0
@@ -159,7 +159,7 @@ def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
         finer = Tracer(
             Flow(flow.rig, flow.name, flow.branch, rtol, tracer.onset.contact), tracer.onset, tracer.limits, tracer.most
         )
-        finer.flow.last_step = finer.last_step  # one long cycle may take more steps than a run is allowed
+        finer.flow.last_step = finer.last_step  # one long cycle may take more steps than the limit of a run
         for i in failing:
             if finer.is_spent:
                 break
@@ -220,11 +220,11 @@ def _limits(rig: Slider | Machine, onset: Onset, between: Sequence[Any] | None) 
     return low, high
 
 
-SIZES = (1e-3, 1e-4, 1e-5, 1e-2)  # distances of the first doubled cycle from the doubling, in unknowns, as tried
+SIZES = (1e-3, 1e-4, 1e-5, 1e-2)  # distances (in unknowns) of the first doubled cycle from the doubling, as tried
 
 
 def doubled_pieces(tracer: Tracer, flips: Sequence[Cycle]) -> list[BranchPiece]:
-    """Pieces of cycles of twice the period, from each doubling `flips` at which no earlier piece ends.
+    """Pieces of cycles of twice the period, one from each doubling in `flips` at which no earlier piece ends.
 
     The integration steps left are shared equally by the doublings; unused ones go to those that need more. Doublings
     of cycles that are stable on one side come first, as their cycles of twice the period may be stable.
@@ -246,7 +246,7 @@ def doubled_pieces(tracer: Tracer, flips: Sequence[Cycle]) -> list[BranchPiece]:
 
 
 def _may_attract(flip: Cycle) -> bool:
-    """True if all multipliers but that of the doubling lie inside the unit circle."""
+    """True if all multipliers of the cycle `flip`, except that of the doubling, lie inside the unit circle."""
     others = sorted(flip.multipliers, key=lambda one: abs(one + 1))[1:]
     return all(abs(one) < 1 for one in others)
 
@@ -257,7 +257,7 @@ def _go_on(tracer: Tracer, pieces: list[BranchPiece], flips: Sequence[Cycle], re
         for k, piece in enumerate(waiting):
             if tracer.interrupted or tracer.is_spent:
                 return
-            if piece in pieces:  # else it was joined to another piece
+            if piece in pieces:  # otherwise it was joined to another piece
                 tracer.allot(len(waiting) - k)
                 others = [one for one in pieces if one is not piece]
                 tracer.gone_on(piece, met=partial(met, others))
@@ -310,7 +310,7 @@ def _nearest(flips: Sequence[Cycle], piece: BranchPiece) -> int | None:
 def _close(tracer: Tracer, piece: BranchPiece, flip: Cycle) -> None:
     """End a piece at a doubling: append a cycle near it, at a distance of `SIZES`.
 
-    Of the two cycles near the doubling, which differ by half a period, the one in phase with the last cycle is taken.
+    Two cycles lie near the doubling, which differ by half a period; the cycle in phase with the last cycle is taken.
     """
     piece.stops = End("period doubling", flip.value, flip)
     last = piece.points[-1]

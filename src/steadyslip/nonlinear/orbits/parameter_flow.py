@@ -69,7 +69,7 @@ class Flow(FlowRunner):
         self.rounding = self._rounding(own)
 
     def _rounding(self, value: float) -> float:
-        """Error in the state, in natural sizes, that rounding of forces makes in steady sliding.
+        """Error of the state in steady sliding, in natural sizes, that rounding of forces causes.
 
         Forces are small sums of far larger terms, so that rounding shifts the state at which they balance.
         """
@@ -135,7 +135,7 @@ class Flow(FlowRunner):
         return np.array([where[symbol] for symbol in self.reduction.state])
 
     def ahead(self, value: float, ways: float) -> Array:
-        """State (n,) after the load point has jumped back from steady sliding by `ways` natural sizes of slip."""
+        """State (n,) just after the load point has jumped back from steady sliding by `ways` natural sizes of slip."""
         shifts = self.setting(value).point.evaluate(_shifts(self.reduction))
         found = self.steady(value)
         for i, shift in enumerate(shifts):

@@ -21,7 +21,7 @@ class Stretch:
     ----------
     stable : bool
     cycles : tuple of Cycle
-        With those of the ends, if an end has one.
+        The cycles of the stretch, together with the cycles at its ends if there are any.
     ends : tuple of End
         First and last end along the branch, with a kind of `SpecialCycle` or `End`, or ``not located`` if no
         bifurcation was found between the last cycle of the stretch and its neighbour of other stability.
@@ -33,7 +33,7 @@ class Stretch:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Lowest and highest value of the parameter, SI units; cycles within rounding of an end count as at it."""
+        """Lowest and highest value of the parameter, SI units; cycles within rounding of an end get the end's value."""
         ends = [end.value for end in self.ends]
         values = [value for value in (cycle.value for cycle in self.cycles) if not _near(value, ends)]
         return min([*values, *ends]), max([*values, *ends])
@@ -130,7 +130,7 @@ def is_open(cycle: Cycle) -> bool:
 
 
 def is_undecided(cycle: Cycle) -> bool:
-    """True if errors of the multipliers leave stability undecided, and the kind of onset does not decide it."""
+    """True if neither the multipliers, because of their errors, nor the kind of onset decide the stability."""
     return not (cycle.checks[1].passed or _is_small(cycle))
 
 

@@ -18,10 +18,10 @@ from steadyslip.nonlinear.continuation import Failure, SolutionCurve
 from steadyslip.nonlinear.orbits.flow import FlowRunner, FlowSetting, passages
 
 ONE = np.ones(1)
-ROUNDED = 300.0  # largest Newton step that counts as converged once steps no longer shrink, in rounding errors of state
-KNOWN = 1e-3  # bound of that step, as a share of the cycle's size
-FAR = 0.1  # residual of a prediction above which its period is corrected first: too far for Newton's method
-SAME = 1e-8  # difference of unknowns within which cached sensitivities are used: the largest last Newton step
+ROUNDED = 300.0  # largest last Newton step, in rounding errors of the state, if steps no longer shrink
+KNOWN = 1e-3  # bound of that last step as a share of the cycle's size
+FAR = 0.1  # if the residual of a prediction is larger, its period is corrected before Newton's method is used
+SAME = 1e-8  # cached sensitivities are used if unknowns differ by less than this, the largest last Newton step
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ class Shooting:
         return np.asarray(self._run(u)[1] * self.flow.scales[None, :] / self.flow.scales[:, None])
 
     def forget(self) -> None:
-        """Drop the cached integration."""
+        """Drop the cached results of the last integration."""
         self._last = None
 
     def _run(self, u: Array) -> tuple[Array, Array]:

@@ -13,12 +13,12 @@ from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 NOISE = 3e-9  # relative difference of parameter values that rounding explains near the onset
-MET = 2e-3  # difference of the logarithms of period and velocities below which two cycles count as one
+MET = 2e-3  # two cycles count as the same if the logarithms of period and velocities differ by less than this
 BLURRED = 10.0  # factor from the last Newton step to the uncertainty of the parameter; chosen by trial
 ROUNDING = 1e-11  # relative difference of parameter values that rounding explains anywhere on a branch
-FOLDED = 0.9  # growth below which a fold is rejected: at a true fold a multiplier is 1
+FOLDED = 0.9  # a fold is rejected if all multipliers are smaller than this: at a true fold, one multiplier is 1
 REAL = 1e-3  # relative imaginary part below which a multiplier counts as real: errors split a double real one by it
-SMALL = 1e-2  # amplitude of ln v below which multipliers equal to 1 within rounding are decided by the kind of onset
+SMALL = 1e-2  # for a smaller amplitude of ln v, the kind of onset decides stability if a multiplier is 1 up to rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ def _located(
     size = abs(cycle.value) or 1.0
     away = [abs(known.cycle.value - cycle.value) / size for known in (before, now)]
     blurred = max(NOISE, *(BLURRED * known.point.rounding for known in (before, now)))
-    if kind == "fold" and cycle.growth < FOLDED:  # the start of the cycle moves backwards, not the branch
+    if kind == "fold" and cycle.growth < FOLDED:  # only the start of the cycle moves back, not the branch
         return None
     if kind == "fold" and (min(away) < blurred or cycle.amplitude < SMALL):
         return None

@@ -24,18 +24,18 @@ from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 from steadyslip.nonlinear.orbits.special import SMALL, BranchPoint, changes, may_return
 
 LARGEST_STEP = 0.5  # largest step of arclength; unknowns are logarithms, so about a factor 1.6 of a state
-HALVINGS = 3  # halvings of a step in which a test function may vanish twice: to 1/8 of LARGEST_STEP, 0.06
+HALVINGS = 3  # number of halvings of a step in which a test function may have two zeros: to 1/8 of LARGEST_STEP
 SMALLEST_STEP = 1e-9  # smallest step of arclength, the order of the Newton tolerance
-CREEP = 60  # steps in a row without growth, below 1e-3 of the largest, after which the branch counts as stuck
-SLOW_STEPS, SLOW, FASTER_AGAIN = 8, 0.2, 3.0  # slow: 8 steps below 0.2 of LARGEST_STEP that grow by less than 3
+CREEP = 60  # a branch is stuck after this many steps in a row below 1e-3 of LARGEST_STEP that do not grow
+SLOW_STEPS, SLOW, FASTER_AGAIN = 8, 0.2, 3.0  # steps stay small: 8 below 0.2 of LARGEST_STEP, growing less than 3-fold
 OF_RANGE = 3.0  # scale of a state variable, in units of its range in the cycle, after rescaling
-UNRESOLVED = 1e-7  # distance from 1 of a small cycle's multiplier below which it does not decide stability
-MOST_STEPS = 4_000_000  # integration steps for all pieces of a branch: two example machines take three million
+UNRESOLVED = 1e-7  # a small cycle's multiplier closer to 1 than this does not decide stability
+MOST_STEPS = 4_000_000  # limit of integration steps of all pieces of a branch: two example machines take three million
 USUAL = 3  # number of variables to which MOST_STEPS refers for structures; the cost of a step grows with its square
-OVER = 0.25  # share of the steps of a branch that a last step along it may take beyond them
-LOST = 1e-5  # error of the trivial multiplier beyond which more segments are tried
+OVER = 0.25  # the last step along a branch may exceed the limit of integration steps by this share
+LOST = 1e-5  # more segments are tried if the error of the trivial multiplier exceeds this
 LED = 30.0  # factor on LOST where sensitivities have loose tolerances (`FlowRunner.led`); still below `IMPRECISE`
-HIDDEN = 0.1  # largest share of rounding error in a small cycle's distance from the edge
+HIDDEN = 0.1  # largest allowed rounding error in a small cycle's distance from the edge, as a share of this distance
 INTERRUPTED = "interrupted by the user"
 USED_UP = "the limit of steps was reached"
 
@@ -277,7 +277,7 @@ class Tracer:
         return piece
 
     def _spent(self, steps: int) -> str:
-        """Text for the end of a piece whose integration steps are used up, and what leads further."""
+        """Reason for the end of a piece whose integration steps are used up, with advice on how to go on."""
         fewer = ", or give structures fewer modes (kept_modes) or more damping" if self.structures else ""
         return (
             f"{steps / 1e6:.2g} million steps of integration taken, all that are spent on this part; ask for the rest "
@@ -455,7 +455,10 @@ class Tracer:
         return LOST * (LED if self.flow.slack == HARDLY_HEARD else 1.0)
 
     def _attracts(self, cycle: Cycle) -> bool:
-        """True if all multipliers lie inside the unit circle; small cycles too close to it follow the kind of onset."""
+        """True if the cycle is stable: all multipliers lie inside the unit circle.
+
+        For a small cycle with a multiplier too close to the circle, the kind of onset decides.
+        """
         if self.onset.is_weak and abs(cycle.growth - 1) < IMPRECISE:
             return False
         if cycle.amplitude < SMALL and abs(cycle.growth - 1) < max(UNRESOLVED, UNCERTAIN * cycle.multiplier_error):
@@ -496,7 +499,7 @@ class Tracer:
 
 
 def orbit_of(cycle: Cycle) -> Orbit:
-    """States and period from which a cycle was computed."""
+    """`Orbit` (states and period) from which a cycle was computed."""
     if cycle._orbit is None:
         raise InternalError("a cycle has no solution of its equations to start from; this is a bug, please report it")
     return cycle._orbit

@@ -17,16 +17,17 @@ from steadyslip.kernels.runner import STATUSES, TALLY, Runner
 from steadyslip.motion.jobs import Jobs
 
 LANES = 24  # three vectors of eight doubles (`printers.llvm` fills the processor with several chains)
-CHUNK = 2048  # jobs per call: keeps arrays small and Ctrl-C prompt; chosen by trial
-QUOTA = 20_000  # steps per call, some tens of ms; between calls Ctrl-C and progress are served
-# statuses beyond those of kernels
+CHUNK = 2048  # jobs per call of the kernel: keeps arrays small, and Ctrl-C acts promptly; chosen by trial
+QUOTA = 20_000  # steps per call of the kernel, some tens of ms; between calls, Ctrl-C and progress are handled
+# statuses in addition to those of kernels
 INTERRUPTED, NO_STEADY, ILL_POSED, OUT_OF_RANGE = range(len(STATUSES), len(STATUSES) + 4)
 
 
 @dataclass
 class Outcome:
-    """Result of a kernel for some jobs; `log` and `recorded` are empty except for a single run; `tables` is its input.
+    """Result of a kernel for some jobs.
 
+    `log` and `recorded` are empty except for a single run; `tables` are the arrays with which the kernel was called.
     ``final``, ``recorded`` and ``samples`` have the columns of `Final`, `Recorded` and `Sampled`; `size` is the length
     of the state, `balances` the number of unknowns of the algebraic equations (balances of forces).
     """
@@ -93,11 +94,11 @@ class Call:
         return found
 
     def time(self) -> float:
-        """Time that the job of the only lane has reached, s."""
+        """Time (s) that the job has reached; for a kernel with a single lane."""
         return clock(self.work, float(self.work[Row.TAU]))
 
     def store_interrupted(self) -> None:
-        """Store the current state of the only lane as its end, after an interruption."""
+        """Store the current state as the end of the run after an interruption; for a kernel with a single lane."""
         layout, y = self.layout, np.empty(output_size(self.layout))
         copy_state(self.work, layout, y)
         self.final[0, : Final.POINT] = [self.time(), *self.work[[Row.SEGMENT, Row.ACCEPTED, Row.REJECTED]]]
@@ -119,7 +120,7 @@ def run_single(
     jobs: Jobs, machine: Runner, times: np.ndarray, watch: bool, record: bool,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:  # fmt: skip
-    """Outcome of one trajectory, with events (`watch`) and solver steps (`record`); Ctrl-C returns its part so far."""
+    """Outcome of one trajectory, with events (`watch`) and solver steps (`record`); after Ctrl-C, its part so far."""
     return run_tables(machine, jobs.tables(machine, 0, 1, watch, record), times, progress)
 
 

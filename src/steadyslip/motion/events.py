@@ -71,8 +71,8 @@ class SlipEvent(Displayed):
     peak_velocity, peak_time : float
         m/s (negative of a backward stroke) and s.
     recurrence : float
-        Time since the beginning of the event before in the same direction, s; NaN for the first, and if that event
-        began before the run.
+        Time (s) since the beginning of the previous event in the same direction; NaN for the first event, and if the
+        previous event began before the run.
     rings : int
         Number of times that the block is again faster than the load point, by a factor of two, before the next event.
     ring_frequency : float
@@ -123,7 +123,7 @@ class ContactEvent(Displayed):
 
 @dataclass(frozen=True)
 class ContactSlip(Displayed):
-    """`SlipEvent` of one contact of a machine; velocities are compared relative to those in steady sliding.
+    """A `SlipEvent` at one contact of a machine; velocities are compared as ratios to those in steady sliding.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ def events_of(
 
 
 def valid_rows(log: np.ndarray) -> np.ndarray:
-    """Rows of a log in order of time, without begins and ends of slip events that are replaced by later rows."""
+    """Rows of a log in order of time, without those begins and ends of slip events that later rows replace."""
     each = len(LOG_KINDS) - 2
     keep = np.ones(len(log), dtype=bool)
     counted: dict[int, list[list[int]]] = {}  # by contact: for each slip event the rows of its begin and end
@@ -187,7 +187,7 @@ def valid_rows(log: np.ndarray) -> np.ndarray:
 
 
 def event_of(kind: str, contact: str, area: float, numbers: Sequence[float]) -> AnyEvent:
-    """Event from its kind and (time, velocity, σ, τ, T, slip), SI units; `area` (m²) converts stresses to forces."""
+    """Event of a kind with `numbers` (time, velocity, σ, τ, T, slip), SI units; `area` (m²) turns stress into force."""
     if not contact:
         return Event(kind, *numbers)
     time, v, sigma, tau, pull, slip = numbers
@@ -195,7 +195,7 @@ def event_of(kind: str, contact: str, area: float, numbers: Sequence[float]) -> 
 
 
 def slip_events(events: Sequence[AnyEvent]) -> tuple[AnySlip, ...]:
-    """Complete slip events of a run, in order of their ends, without events that go on at its end."""
+    """Complete slip events of a run, in order of their ends; events that go on when the run ends are left out."""
     found: list[AnySlip] = []
     for name in dict.fromkeys(event.contact for event in events):
         found += _slips([one for one in events if one.contact == name])
@@ -225,7 +225,7 @@ def _slips(events: Sequence[AnyEvent]) -> list[AnySlip]:
 
 
 def _begun_anew(slips: Sequence[AnySlip]) -> Iterator[AnySlip]:
-    """Yield slip events, with recurrence NaN for the first after one with a far larger drop (a knock)."""
+    """Yield slip events; the first one after an event with a far larger drop (a knock) gets the recurrence NaN."""
     largest = 0.0
     for one in slips:
         anew = _drop(one) < EVENT_SHARE * largest
@@ -238,7 +238,7 @@ def _drop(slip: AnySlip) -> float:
 
 
 def _recurrence(begins: Sequence[AnyEvent]) -> float:
-    """Time (s) between the last begin and the one before in its direction; NaN if that is not known."""
+    """Time (s) between the last begin in `begins` and the previous begin in the same direction; NaN if not known."""
     before = next((one.time for one in begins[-2::-1] if one.kind == begins[-1].kind), 0.0)
     return begins[-1].time - before if before > 0 else float("nan")
 

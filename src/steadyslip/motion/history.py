@@ -46,12 +46,12 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     steps, rejected : int
         Numbers of accepted and rejected steps.
     velocities : tuple of float
-        Lowest and highest velocity of the run, m/s, also between samples; for a machine, a dict of such pairs of slip
-        rates by contact.
+        Lowest and highest velocity of the run, m/s, also between samples; for a machine, a dict with the lowest and
+        highest slip rate of each contact.
     late_error : float
-        With a delay: relative change of slips, peaks, recurrences and range of velocity if delayed signals have more
-        variables; NaN without a delay, and for loaded files. Infinite if slip events agree at first and then differ, as
-        with a smaller `rtol` too: the motion is irregular, and no two runs of it agree.
+        For a rig with a delay: relative change of slips, peaks, recurrences and range of velocity if delayed signals
+        are represented by more variables; NaN without a delay, and for loaded files. Infinite if slip events agree at
+        first and then differ, with a smaller `rtol` too: the motion is irregular, and no two runs agree.
     version : str
         Version of the program that computed the run.
     """

@@ -39,11 +39,9 @@ from steadyslip.protocol.creep import FREE
 from steadyslip.protocol.segments import Segments, pack
 
 METHOD_WORDS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
-TIGHT_RTOL = (
-    1e-5  # rtol up to which the explicit pair of order 8 is faster than that of order 5 (benchmarks/methods.py)
-)
-MOST_STAGES_SOLVED = 8  # limit of stages of a method if equations are solved in each; more take minutes to compile
-BLOW_UP = np.exp(200.0)  # velocity over the drive's that counts as infinite; bounded orbits reach e^14 (theory 7)
+TIGHT_RTOL = 1e-5  # up to this rtol the explicit pair of order 8 is faster than that of order 5 (benchmarks/methods.py)
+MOST_STAGES_SOLVED = 8  # limit of stages of a method that solves equations in each; more take minutes to compile
+BLOW_UP = np.exp(200.0)  # a velocity so many times the drive's counts as infinite; bounded orbits reach e^14
 ROUNDING_DECIDES = (
     "the forces on the block are so much larger than their change with its velocity that rounding decides how it "
     "moves; look for a parameter that is too small or too large by orders of magnitude (a, a damping, a friction level)"
@@ -52,7 +50,7 @@ NEEDS_STIFFNESS = (
     "creep as a part of a run needs a stiffness between drive and body, whose force determines where the drive "
     "goes on, not a dashpot alone; give it one, or let creep last for the whole run (creep-step without creep)"
 )
-CONTACT_SHARE = 1e-9  # share of the steady normal stress below which contact counts as lost: the laws end at 0
+CONTACT_SHARE = 1e-9  # contact counts as lost below this share of the steady normal stress: laws are not defined at 0
 
 
 @dataclass(frozen=True)
@@ -109,14 +107,14 @@ class Jobs:
         Initial values of the variables to be solved for (`Reduction.searched`); NaN where unknown.
     reduction : Reduction
     eliminate : int or None
-        Index of the memory variable that follows from the balance of forces and is not integrated; of a machine one
-        for each contact.
+        Index of the memory variable that follows from the balance of forces and is not integrated; for a machine, one
+        index for each contact.
     options : Options
     size : int
     targets : Targets
         Targets of the pieces of the protocol.
     let_go : OperatingPoint, optional
-        Operating points during release of the drive, if the protocol releases it for some time.
+        Operating points while the drive is released, if the protocol releases it for some time.
     """
 
     point: OperatingPoint
@@ -149,7 +147,7 @@ class Jobs:
 
     @property
     def in_range(self) -> np.ndarray:
-        """True where numbers are within floating point and rounding does not decide the motion."""
+        """True (jobs,) where numbers are within the range of floating point and rounding does not decide the motion."""
         return np.asarray(np.atleast_1d(in_range(self.point)) & resolved(self.point))
 
     def choice(self, lanes: int, dense: bool) -> Choice:
@@ -221,10 +219,10 @@ def automatic_method(reduction: Reduction, rtol: float = np.inf) -> str:
     of its stages, or with the many variables of delayed signals.
     """
     kinds = [one.variable.kind for one in reduction.slidings if one.variable is not None]
-    free = "loading" in reduction.model.inputs  # without a spring to stop it the block slides fast, which is stiff
+    free = "loading" in reduction.model.inputs  # without a spring the block slides fast, which is stiff
     if any(one.inertial for one in reduction.model.coordinates) or "linear" in kinds or free:
         return "rodas4"
-    quick = not reduction.unknowns and not reduction.model.late_signals  # to compile
+    quick = not reduction.unknowns and not reduction.model.late_signals  # quick to compile
     return "dop853" if rtol <= TIGHT_RTOL and quick else "tsit5"
 
 
@@ -289,7 +287,7 @@ def prepare(
 
 @cached
 def _taken_up_by(model: Model) -> ArrayFunction:
-    """Compiled function: stiffness (if any) of the element that carries the force of a released drive (cached)."""
+    """Compiled function that returns the stiffness, if any, of the element that carries a released drive's force."""
     return model.function([] if model.letting_go is None else [model.letting_go.stiffness])
 
 

@@ -14,7 +14,7 @@ LATE_TOLERANCE = 0.01
 NAMES = ("slip", "peak_velocity", "recurrence")
 FEWEST = 3
 """Least number of leading slip events that must agree in irregular motion: with two times between them."""
-STILL = 1e-6  # range of velocity over the largest below which a motion counts as steady: ten times the default rtol
+STILL = 1e-6  # motion is steady if velocity varies by less than this share of its largest value: ten times default rtol
 
 
 def late_error(run: History, finer: History) -> float:
@@ -22,7 +22,7 @@ def late_error(run: History, finer: History) -> float:
     if run.status != finer.status:
         return np.inf
     found = [abs(run.end - finer.end) / run.end]
-    if run.status != BLOWN_UP:  # in a blow-up the highest velocity is that of the last step
+    if run.status != BLOWN_UP:  # in a blow-up the highest velocity depends on the last step
         first, second = _extremes(run), _extremes(finer)
         moving = np.maximum(np.ptp(first, axis=1), STILL * np.abs(first).max(axis=1))
         found.append(float(np.max(np.abs(first - second) / moving[:, None])))
@@ -35,10 +35,11 @@ def late_error(run: History, finer: History) -> float:
 
 
 def parts_anyway(run: History, finer: History, closer: History) -> bool:
-    """True if slip events depend on any change of accuracy, as in chaotic motion, not only on that of the delay.
+    """True if slip events change with any change of accuracy, as in chaotic motion, not only with that of the delay.
 
-    `finer` has more variables of every delayed signal, `closer` a smaller rtol. The first slip events agree with
-    `closer`, but not all, and with `finer` for at least half as many.
+    `finer` is the run with more variables for every delayed signal, `closer` the run with a smaller rtol. The result is
+    True if the first slip events of `run` agree with `closer`, but not all of them, and at least half as many with
+    `finer`.
     """
     alike = _alike(run, finer)
     own = min(len(run.slip_events), len(closer.slip_events))
@@ -76,7 +77,7 @@ def _extremes(run: History) -> np.ndarray:
 
 
 def _apart(one: float | np.ndarray, other: float | np.ndarray) -> np.ndarray:
-    """Relative difference; 0 where both are NaN or equal, infinite where only one is NaN or zero."""
+    """Relative difference of two values; 0 where both are NaN or equal, infinite where only one is NaN or zero."""
     with np.errstate(all="ignore"):
         apart = np.abs(np.subtract(one, other)) / np.abs(one)
     neither = (np.isnan(one) & np.isnan(other)) | (np.equal(one, other))

@@ -56,7 +56,7 @@ def event_unit(name: str) -> str:
 
 
 def event_names(rig: Rig) -> tuple[str, ...]:
-    """Columns of `Ensemble.events`; of a machine for each contact, with its name as prefix."""
+    """Names of the columns of `Ensemble.events`; for a machine each contact has its own, with its name as prefix."""
     if not rig.contact_names:
         return tuple(EVENT_UNITS)
     return tuple(f"{contact}.{_contact_column(name)}" for contact in rig.contact_names for name in EVENT_UNITS)
@@ -66,7 +66,7 @@ NORMAL_FORCE = ".normal_force"
 
 
 def _contact_column(name: str) -> str:
-    """Name of a column for a contact of a machine, where stresses become forces."""
+    """Name that a column has for a contact of a machine, where stresses become forces."""
     return name.replace("stress_drop", "force_drop")
 
 
@@ -137,7 +137,7 @@ class Ensemble(ReadOnly):
         return f"{self.status_code.size} runs: " + ", ".join(parts)
 
     def _lifted(self, code: int) -> str:
-        """Format the contacts that lifted off in runs of a status, with the number of runs of each."""
+        """Text of the contacts that lifted off in runs with the status `code`, with the number of runs for each."""
         names, counts = np.unique(self.contact[self.status_code == code], return_counts=True)
         parts = [f"{name} {count}" for name, count in zip(names, counts, strict=True) if name]
         return f" ({', '.join(parts)})" if parts else ""
@@ -259,7 +259,7 @@ def simulate_many(
 def broadcast_arrays(
     rig: Slider | Machine, plan: Protocol, vary: Mapping[str, Any], initial: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, Any], BroadcastArrays]:
-    """Flat arrays of equal length: of parameters by full name, of initial values by name; and their broadcast shape."""
+    """Flat arrays of equal length of parameters (by full name) and of initial values, and their broadcast shape."""
     known = dict.fromkeys([*rig.parameters(), *parameters(plan, "protocol.")])
     problems, named = [], {}
     for name, value in vary.items():
@@ -360,7 +360,7 @@ class _Store:
         ended = np.where(absent, NO_STEADY, np.where(posed, outcome.status, ILL_POSED))
         self.code[where] = np.where(known, ended, OUT_OF_RANGE)
         self.end[where] = np.where(absent, np.nan, outcome.final[:, Final.TIME])
-        counts = np.nan_to_num(outcome.steps)  # NaN for runs that were not finished
+        counts = np.nan_to_num(outcome.steps)  # the number of steps is NaN for runs that were not finished
         self.steps[where], self.rejected[where] = counts.T
         for name, (column, contact, force) in self.columns.items():
             area = own.evaluate(areas(own.model))[contact] if force else 1.0
@@ -396,7 +396,7 @@ class _Store:
     def check_late(
         self, jobs: Jobs, index: np.ndarray | None, size: int, times: np.ndarray, threads: int | None
     ) -> bool:
-        """Repeat runs with more variables of delayed signals and mark those that differ; False if Ctrl-C ended it."""
+        """Repeat runs with more variables for delayed signals, and mark the runs that differ; False after Ctrl-C."""
         finer = _Store(jobs, len(self.code), times, (), True)
         if not _run(jobs, finer, index, size, times, threads, None):
             return False

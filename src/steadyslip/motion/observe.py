@@ -24,10 +24,10 @@ Tables = tuple[np.ndarray, ...]
 OBSERVED = ("v", "acceleration", "normal_stress", "shear_stress", "spring_stress", "load_velocity",
             "load_displacement")  # fmt: skip
 """Outputs of the driver's `observe` for each contact, in this order."""
-LOADING = "loading of the drive"  # key of an intermediate value, not in results: imposed force on the drive
-WAY, LOAD = "way of the drive", "velocity of the drive"  # as LOADING, for a contact: displacement and velocity
+LOADING = "loading of the drive"  # key of an intermediate value, left out of results: imposed force on the drive
+WAY, LOAD = "way of the drive", "velocity of the drive"  # more such keys: displacement and velocity of the drive
 STRESSES = ("normal_stress", "shear_stress", "spring_stress")
-UNSEEN = ("held", "past")  # kinds of variables that are not in results
+UNSEEN = ("held", "past")  # kinds of variables that results do not contain
 EXTRA_UNITS = {"slip": "m", "load_displacement": "m", "acceleration": "m/s^2", "load_velocity": "m/s"}
 
 
@@ -104,7 +104,7 @@ def _arguments(model: Model) -> dict[sp.Symbol, str]:
 
 @cached
 def _function(model: Model) -> tuple[list[str], list[str], ArrayFunction]:
-    """Names of computed observables, names of their arguments, and the compiled function (cached)."""
+    """Names of the computed observables, names of the arguments, and the compiled function that computes them."""
     given = _arguments(model)
     known = set(given.values())
     names = [n for n in model.observables if n not in known]
@@ -125,7 +125,8 @@ def observe(
     time : ndarray (points,)
         Time since the start of the run, s.
     points : ndarray (points, 1 + state + further unknowns)
-        States with solutions of the algebraic equations (NaN where not known) before and after: see `Sampled`.
+        The first unknown of the algebraic equations, the state, and the further unknowns, as in `Sampled`; unknowns
+        are NaN where they are not known.
     tables : tuple of ndarray, optional
         Tables of the jobs from `first` on, if they are already computed.
     """
@@ -191,7 +192,7 @@ def _shift_to_load_point(
 
 
 def _at_contacts(model: Model, values: Array) -> dict[str, Array]:
-    """Outputs of the driver's `observe` by name."""
+    """Outputs of the kernel driver's function `observe`, by name."""
     found: dict[str, Array] = {}
     for i, contact in enumerate(model.contacts):
         seen = dict(zip(OBSERVED, values[len(OBSERVED) * i :], strict=False))

@@ -23,8 +23,8 @@ from steadyslip.motion.history import HistoryData
 from steadyslip.motion.sentence import drop_of, joined, oscillations, sentences
 from steadyslip.motion.status import remedy
 
-NUDGED, FASTER = 0.1, 1.1  # time (share of a run) and factor of the suggested step of the drive's velocity
-STEADY_SPREAD = 1e-4  # relative spread of velocity up to which a run counts as steady: below the printed digits
+NUDGED, FASTER = 0.1, 1.1  # a message suggests to speed up the drive by FASTER for this share of the run
+STEADY_SPREAD = 1e-4  # a run is steady if velocity varies by less than this share: below the printed digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     @property
     def nudge(self) -> tuple[str, str]:
-        """Two protocol pieces as text: the drive is faster by a tenth for a tenth of the run, then as before."""
+        """Text of two protocol pieces: the drive is faster by a tenth for a tenth of the run, then as before."""
         value, unit = self.rig.display_value("drive.velocity", float(self.rig.drive.velocity))
         begin, end = (format_quantity(share * self.end, "s") for share in (NUDGED, 2 * NUDGED))
         faster = format_quantity(FASTER * value, unit)
@@ -210,7 +210,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         } | self._forces(last)
 
     def _forces(self, last: dict[str, float]) -> dict[str, Any]:
-        """Final values for the whole contact area; empty without an area."""
+        """Final forces, for the whole contact area; empty for a rig without an area."""
         found = totals(last, self.units, self.rig.area)
         return {"forces": {"area": found["area"], "final": found["values"], "units": found["units"]}} if found else {}
 

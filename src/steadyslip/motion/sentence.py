@@ -35,11 +35,11 @@ CREEPS = ", at up to {peak}"
 DIFFERS = " ({before} the time before)"
 """Addition with the slip of the forward event before the last, if it differs by more than `ALIKE`."""
 DIGITS = 3  # significant digits of quantities in sentences
-TREND = 0.01  # relative growth or decay of swings in the last half of a run up to which an oscillation is steady
-LAST = 0.9  # share of a run after which swings that grew before must be alike for an oscillation to be steady
+TREND = 0.01  # an oscillation is steady if its swings grow or decay by no more than this in the last half of a run
+LAST = 0.9  # swings that grew before must be alike after this share of a run for an oscillation to be steady
 BEATS = 1.2  # largest ratio of swings of a steady oscillation, which may beat; by trial
-SUDDEN = 10.0  # ratio of peak to mean velocity of an event; a half sine has 1.6, stick-slip without creep 2 to 4
-OVER = 2.0  # time without an event, in longest late recurrences, after which events have come to an end
+SUDDEN = 10.0  # least ratio of peak to mean velocity of a sudden slip; half sine: 1.6, stick-slip without creep: 2 to 4
+OVER = 2.0  # events have ended if none occurs for this many times the longest recurrence of late events
 ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
 
 
@@ -55,7 +55,7 @@ def pull_words(rig: Slider | Machine, contact: str) -> str:
 
 
 def drop_of(slip: ContactSlip, lever: float | None) -> tuple[float, str]:
-    """Drop of the pull in a slip event, and its unit: N, or N m if the body turns, at a radius of `lever` (m)."""
+    """Drop of the pull in a slip event, and its unit: N, or N m if the body turns, with the radius `lever` (m)."""
     return (slip.force_drop, "N") if lever is None else (slip.force_drop * lever, "N m")
 
 
@@ -65,9 +65,9 @@ def sentence(
 ) -> str:  # fmt: skip
     """Sentence on the slip events of a block or contact; empty if there are none.
 
-    It describes the last forward event (recurrence, slip, duration, drop, slip of the one before if that differs, and
-    ringing) and the last backward stroke. The block *sticks* if it was arrested since the event before, else it *lags*
-    behind the load point. It *judders* if events go on; long after the last one it slips no more.
+    It describes the last forward event (recurrence, slip, duration, drop, slip of the previous event if that differs,
+    and ringing) and the last backward stroke. The block *sticks* if it was arrested since the previous event, else it
+    *lags* behind the load point. It *judders* if events go on; long after the last event it slips no more.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def sentence(
 
 
 def _longest(slips: Sequence[AnySlip], last: AnySlip, end: float) -> float:
-    """Longest recurrence (s) of the last forward event and those in the last half of a run."""
+    """Longest recurrence (s) among the last forward event and the events in the last half of a run."""
     late = [one.recurrence for one in slips if one.slip > 0 and one.begin > 0.5 * end and math.isfinite(one.recurrence)]
     return max([last.recurrence, *late])
 
@@ -137,7 +137,10 @@ def sentences(
 
 
 def joined(rig: Slider | Machine, sentences: Mapping[str, str]) -> str:
-    """One sentence from those of the contacts, by name of the contact, or of the body if all its contacts agree."""
+    """One sentence made of the sentences of the contacts.
+
+    Each part begins with the name of the contact, or of the body if all its contacts have equal sentences.
+    """
     held = {name: rig.contacts[name].held if name in rig.contacts else name for name in sentences}
     by_body: dict[str, set[str]] = {}
     for name, words in sentences.items():
@@ -176,7 +179,8 @@ def steady_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
 def growing_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
     """Last swing of each contact whose swings grow in the last half of a run and up to its end, by name.
 
-    Decaying beats grow at times, too, but not beyond those of the second quarter (the first has the disturbance).
+    Decaying beats grow at times, too, but not beyond the swings of the second quarter of the run; the first quarter
+    has the disturbance.
     """
     found = {}
     for name in dict.fromkeys(one.contact for one in events):
@@ -191,9 +195,9 @@ def growing_swings(events: Sequence[AnyEvent], end: float) -> dict[str, Swings]:
 
 
 def _settled(events: Sequence[AnyEvent], name: str, end: float) -> bool:
-    """True if swings that grew in the last half of a run differ by less than `TREND` in its last tenth.
+    """True if swings that grew in the last half of a run differ by at most `TREND` in its last tenth.
 
-    Growth by `BEATS` in half a run at a constant rate is 4 % in the last tenth.
+    Swings that grow by `BEATS` in half a run at a constant rate would grow by 4 % in the last tenth.
     """
     half, late = (_sizes(*_extremes(events, name, share * end)) for share in (0.5, LAST))
     return len(late) > 2 and late[-1] > BEATS * half[0] and max(late) <= (1 + TREND) * min(late)
@@ -224,7 +228,7 @@ def oscillates(swings: Swings) -> str:
 
 
 def speeds(swings: Swings) -> str:
-    """Format lowest and highest velocity of an oscillation, both in the unit of the highest."""
+    """Text of the lowest and the highest velocity of an oscillation, both in the unit of the highest."""
     low = format_like(swings.low, swings.high, "m/s", DIGITS)
     return f"{low} and {format_quantity(swings.high, 'm/s', DIGITS)}"
 
@@ -247,11 +251,11 @@ def _extremes(events: Sequence[AnyEvent], name: str, since: float) -> tuple[list
 
 
 def _stuck(events: Sequence[AnyEvent], last: AnySlip) -> bool:
-    """True if the block was arrested between the event before and this one."""
+    """True if the block was arrested between the previous slip event and `last`."""
     return any(one.kind == "arrest" and last.begin - last.recurrence < one.time < last.begin for one in events)
 
 
 def _format(values: Sequence[float], unit: str, area: float | None = None) -> str:
-    """Format values as one, or as a range if they differ in the printed digits."""
+    """Text of values: one number, or a range if they differ in the printed digits."""
     low, high = (format_quantity(end(values), unit, DIGITS, area) for end in (min, max))
     return low if low == high else format_range(min(values), max(values), unit, area, DIGITS)

@@ -33,7 +33,7 @@ from steadyslip.motion.status import BLOWN_UP, LOST, UNRESOLVED, WORDS, ending_c
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import segment_of
 
-CLOSER = 0.1  # factor on rtol for a third run, if the second with more variables of delayed signals differs
+CLOSER = 0.1  # factor on rtol for a third run, if the second run, with more variables for delayed signals, differs
 OWN_STEPS = 500_000
 """Limit of steps of a run that records them: a point takes some hundred bytes, and order 8 records four per step."""
 
@@ -147,7 +147,7 @@ def _simulated(
 
 @lru_cache(maxsize=32)
 def _with_end(plan: Protocol, until: float) -> Protocol:
-    """Protocol with its end set."""
+    """Copy of the protocol that ends at `until` (s)."""
     return plan if plan.until == until else replace(plan, until=until)
 
 
@@ -238,7 +238,7 @@ def areas(model: Model) -> ArrayFunction:
 def _velocities(
     outcome: Outcome, contacts: tuple[str, ...], found: dict[str, np.ndarray], events: tuple[AnyEvent, ...]
 ) -> tuple[float, float] | dict[str, tuple[float, float]]:
-    """Lowest and highest velocity (m/s) of a run, by contact for a machine; from samples, events and statistics."""
+    """Lowest and highest velocity (m/s) of a run, for a machine by contact; from samples, events and statistics."""
     each: dict[str, tuple[float, float]] = {}
     for i, name in enumerate(contacts):
         first, samples = i * len(TALLY), found[f"{name}.slip_rate" if name else "v"]
@@ -251,7 +251,7 @@ def _velocities(
 
 
 def _last_event(kind: str, jobs: Jobs, machine: Runner, outcome: Outcome, surfaces: tuple[float, ...]) -> AnyEvent:
-    """Event at the early end of a run; for a machine at the contact that is lost, or fastest in a blow-up."""
+    """Event at the early end of a run; for a machine, at the contact that is lost or, in a blow-up, the fastest."""
     zero, final = np.zeros(1, dtype=int), outcome.final[0]
     segment, time = final[[Final.SEGMENT]].astype(int), final[[Final.TIME]]
     found = observe(jobs, machine, 0, zero, segment, time, outcome.point, outcome.tables)

@@ -68,12 +68,14 @@ def causes(rig: Rig) -> dict[str, str]:
 
 
 def ending_contact(point: OperatingPoint, status: str, stresses: Any, rates: Any) -> np.ndarray:
-    """Index of the contact at which a run ended: least normal stress relative to steady sliding, or fastest slip.
+    """Index of the contact at which a run ended.
+
+    At loss of contact it has the least normal stress relative to steady sliding, in a blow-up the fastest slip.
 
     Parameters
     ----------
     point : OperatingPoint
-        The rigs of k runs, or of one.
+        The rigs of k runs, or the one rig of all runs.
     status : str
         Status of the runs, one of `WORDS`.
     stresses, rates : sequence of array_like

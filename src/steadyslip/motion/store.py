@@ -25,7 +25,7 @@ from steadyslip.motion.status import WORDS
 from steadyslip.motion.targets import targets
 
 RUN = FileKind("run", 3, 2**29, "simulate again and save the run anew")
-MOST_EVENTS = 10**6  # limit of events in a file, for memory: some 100 bytes each
+MOST_EVENTS = 10**6  # largest number of events in a file, to limit memory: an event takes some 100 bytes
 _EVENT_UNITS = {
     "time": "s", "velocity": "m/s", "normal_stress": "Pa", "shear_stress": "Pa", "spring_stress": "Pa", "slip": "m",
 }  # fmt: skip

@@ -89,7 +89,7 @@ class _TargetSearch:
         self.problems: list[Problem] = []
 
     def found(self) -> Targets:
-        """Targets of the protocol; raises all problems together."""
+        """Targets of the protocol; raises one ParameterError with all problems."""
         own = [self._of(piece, f"protocol.pieces.{i}") for i, piece in enumerate(self.plan.pieces, start=1)]
         if self.plan.frees_load_point:
             self._load_point_is_free()

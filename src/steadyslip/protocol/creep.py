@@ -15,11 +15,11 @@ from steadyslip.protocol.curves import Array, Curve, Jump, Wave, column
 LOADING, FREE, SWITCH = 1, 3, 4
 """Disturbance channels of a run with a released drive. `LOADING`: force of the drive (Pa, N or N m); `FREE`: 1 while
 it is released; `SWITCH`, where a release begins: 1 to keep the drive's present force, 2 to take the imposed one."""
-ROUNDING = 1e-12  # relative difference of two times that counts as zero: some thousand rounding errors of a sum
+ROUNDING = 1e-12  # two times count as equal if their relative difference is smaller: some thousand rounding errors
 
 
 class PieceLike(Protocol):
-    """Interface of `steadyslip.protocol.Piece`, which cannot be imported here, as its module imports this one."""
+    """Interface of `steadyslip.protocol.Piece`, which cannot be imported here because its module imports this one."""
 
     name: ClassVar[str]
     channel: ClassVar[int]
@@ -124,7 +124,7 @@ def _spans(pieces: Sequence[PieceLike], drive: Sequence[Curve]) -> list[Release]
         later = drive[k + 1].times[:, :1] if k + 1 < len(drive) else np.full((1, 1), np.inf)
         end = later
         if times.shape[1] > 1:
-            own = times[:, 1:]  # at + duration may round to just beyond the start of the next piece
+            own = times[:, 1:]  # rounding may make at + duration exceed the start of the next piece
             end = np.where(np.abs(later - own) <= ROUNDING * np.abs(own), np.maximum(later, own), own)
         force = getattr(piece, "to", None)
         found.append(Release(times[:, :1], end, None if force is None else column(force)))

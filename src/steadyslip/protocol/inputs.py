@@ -70,7 +70,7 @@ def segment_of(segments: Segments, lane: Any, time: Array) -> Indices:
 
 
 def _parts(segments: Segments, lane: Any, segment: Any) -> tuple[Any, Array, Array, list[tuple[Array, Array, Array]]]:
-    """Index arrays, values, slopes and waves at given lanes and segments; channels are the last axis."""
+    """Index arrays, values, slopes and waves of the given lanes and segments; channels are the last axis."""
     where = (lane if len(segments.start) > 1 else np.zeros_like(lane), segment)
     if not segments.amplitude.shape[-1]:
         return where, segments.value[where], segments.slope[where], []

@@ -167,7 +167,7 @@ class SlideHoldSlide(Piece, name="slide-hold-slide"):
         return Curve(times, np.tile(sliding, holds), np.tile(sliding[:, ::-1], holds))
 
     def _times(self) -> Array:
-        """Start and end of the holds in turn (s), (lanes, 2 holds)."""
+        """Times (s) at which the holds start and end, in order of time, (lanes, 2 per hold)."""
         holds = np.unique(np.asarray(self.repeats, dtype=int))
         if holds.size != 1:
             raise ParameterError([Problem("repeats", "differs between lanes; all need the same number of holds")])

@@ -21,9 +21,10 @@ CHANNELS = 3
 
 
 def channel_of(kind: int, number: int, disturbances: int) -> int:
-    """Channel index of disturbance or normal stress number 0, 1, ... of a run.
+    """Index of the channel of a disturbance or normal stress, which are numbered 0, 1, ... in a run.
 
-    Number 0 has the channel of its kind; other disturbances follow from `CHANNELS` on, then other normal stresses.
+    Number 0 has the channel of its kind. Further disturbances have the channels from `CHANNELS` on, and further normal
+    stresses the channels after these.
 
     Parameters
     ----------
@@ -42,8 +43,9 @@ class Piece(FrozenRecord, family="protocol piece"):
     """Base of protocol pieces: each acts on one channel.
 
     A subclass is registered under a name, sets the kind of `channel` it acts on (load-point velocity, disturbance
-    stress or normal stress; a run has one of the latter two for each body or contact acted on), and overrides one of
-    the methods `curve`, `wave` and `jump`. Fields may be floats or 1-D arrays with one value per lane.
+    stress or normal stress; a run has one disturbance channel for each body and one normal-stress channel for each
+    contact acted on), and overrides one of the methods `curve`, `wave` and `jump`. Fields may be floats or 1-D arrays
+    with one value per lane.
     """
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("kind", None)

@@ -55,7 +55,7 @@ class Segments:
         return "linear" if np.any(self.slope) else "constant"
 
     def divisors(self) -> Array:
-        """Angular frequencies (rad/s), and 1 where there is no wave, as divisors."""
+        """Angular frequencies (rad/s) by which to divide; 1 where there is no wave."""
         return np.where(self.amplitude == 0, 1.0, self.angular_frequency)
 
     def rows(self, start: int, stop: int) -> Array:
@@ -81,7 +81,7 @@ class Segments:
 
 @dataclass
 class _Terms:
-    """Curves and waves with their channel, jumps and creep spans of all pieces of a protocol."""
+    """Elements of all pieces of a protocol: curves and waves with their channels, jumps, and spans of creep."""
 
     curves: list[tuple[int, Curve]] = field(default_factory=list)
     waves: list[tuple[int, Wave]] = field(default_factory=list)
@@ -122,7 +122,7 @@ def pack(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, ...
     until : float or 1-D array
         End of each lane, s; the protocol is cut there, and changes at this very time have no effect.
     channels : tuple of int, optional
-        Channel of each piece; by default the first one of its kind.
+        Channel of each piece; by default the first channel of its kind.
 
     Returns
     -------

@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-_SHARE = 16  # one step may take 1/16 of the terms left; one count halves pieces of the axis about 16 times
+_SHARE = 16  # one step of a count may evaluate 1/16 of the terms left, as a count has about 16 steps
 
 
 @dataclass
 class CountingAllowance:
-    """Number of terms left, and True in `spent` if more were needed."""
+    """Number of terms that may still be evaluated; `spent` becomes True if a count needed more."""
 
     left: int
     spent: bool = False
@@ -38,13 +38,13 @@ def at_most(terms: int) -> Iterator[CountingAllowance]:
 
 
 def at_a_time(most: int) -> int:
-    """Number of terms that one step of a count may take: at most `most`, and a share of those left."""
+    """Number of terms that one step of a count may evaluate: at most `most`, and at most a share of those left."""
     own = _CURRENT.get()
     return most if own is None else min(most, own.left // _SHARE)
 
 
 def may_take(terms: int) -> bool:
-    """Take `terms` from the current allowance; False if it has fewer; always True outside `at_most`."""
+    """Subtract `terms` from the current allowance; False if fewer are left; always True outside `at_most`."""
     own = _CURRENT.get()
     if own is None:
         return True

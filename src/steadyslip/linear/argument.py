@@ -17,14 +17,17 @@ from steadyslip.linear.neutral import Sets, argument_at, bound_on_axis, highest,
 from steadyslip.linear.roots import Array, ComplexArray, evaluate, quietly
 
 UNKNOWN = -2  # count of roots where counting takes too long
-_MOST = 400_000  # unresolved pieces of the axis, of all rigs together, before counting is given up; by trial: memory
-_NEAR = 1e-13  # relative length at which a piece is not cut further (rounding): a root lies on it
+_MOST = 400_000  # most unresolved pieces of the axis, of all rigs together; more would take too much memory (by trial)
+_NEAR = 1e-13  # length of a piece over its frequency below which it is not cut further (rounding): a root lies on it
 
 
 @dataclass(frozen=True, eq=False)
 class _Pieces:
-    """Pieces of the imaginary axis: index of the rig (pieces,), and at both ends the frequencies (2, pieces), the terms
-    without their factors e^(−sh), (2, m, pieces), and their sum with these factors (2, pieces)."""
+    """Pieces of the imaginary axis.
+
+    Arrays are the index of the rig (pieces,) and, at both ends of a piece, the frequency (2, pieces), the terms without
+    their factors e^(−sh), (2, m, pieces), and their sum with these factors (2, pieces).
+    """
 
     row: NDArray[np.int64]
     omega: Array
@@ -56,7 +59,7 @@ class SumsOnAxis:
     sets: Sets
 
     def at(self, row: NDArray[np.int64], omega: Array) -> tuple[ComplexArray, ComplexArray]:
-        """Terms at iω without their factors exp(−sh), (m, frequencies), and the sum with these factors."""
+        """The terms at s = iω without their factors exp(−sh), (m, frequencies), and their sum with them."""
         terms = np.array([evaluate(self.c[row, j], 1j * omega) for j in range(self.c.shape[1])])
         late = (p * np.exp(-1j * self.h[row, j + 1] * omega) for j, p in enumerate(terms[1:]))
         return terms, np.asarray(terms[0] + sum(late))
@@ -73,16 +76,17 @@ class SumsOnAxis:
         return _Pieces(row[:, 1:].ravel(), *both)
 
     def cut(self, old: _Pieces) -> _Pieces:
-        """Pieces cut into halves."""
+        """Two pieces for each piece, which is cut in the middle."""
         middle = 0.5 * (old.omega[0] + old.omega[1])
         parts = zip((old.omega, old.terms, old.total), (middle, *self.at(old.row, middle)), strict=True)
         both = (np.concatenate([np.stack([own[0], new]), np.stack([new, own[1]])], axis=-1) for own, new in parts)
         return _Pieces(np.tile(old.row, 2), *both)
 
     def units(self, pieces: _Pieces) -> Iterator[tuple[Array, Array, Array]]:
-        """Yield two units (2, pieces) in which terms are compared: 1, and the highest power of ω, for high frequencies.
+        """Yield two units (2, pieces) by which terms are divided before they are compared: 1, and the highest power of
+        ω. The second is for high frequencies. Each unit comes with two bounds (pieces,) of the slope of the sum: the
+        part due to the polynomials, and the part due to the delays.
 
-        With each unit, bounds (pieces,) of the slope of the sum: by the polynomials, and by the delays.
         """
         size, (_, top) = np.abs(self.c), highest(self.c)
         power, (low, high) = np.arange(size.shape[-1]), pieces.omega

@@ -36,9 +36,9 @@ from steadyslip.model.range import require_digits, require_range
 
 _TOO_MANY = "roots under the delays are too many there to be counted; shorten the delays"
 _ERRORS = "the response is too short, too coarse or too uncertain there; analyze says which"
-_TERMS = 12_000_000  # evaluated on the imaginary axis for all edges together: some five seconds
+_TERMS = 12_000_000  # most terms evaluated on the imaginary axis in the searches of all margins: some five seconds
 REMOTE = 100  # factor between value and edge above which the edge ranks last: nobody changes a rig as much
-_TIED = 6  # digits to which distances are compared; pages compute edges to twelve digits
+_TIED = 6  # significant digits to which distances are compared, so that rounding errors do not change their order
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,12 @@ class Margin(Displayed):
 
     @property
     def about(self) -> tuple[Boundary, ...]:
-        """Edges next to the value, below and above it, nearest first; a remote edge only if it is the nearest."""
+        """The next edge below the value and the next above, nearer one first.
+
+        A remote edge is given only if it is the nearest.
+
+        A remote edge only if it is the nearest.
+        """
         found = edges_about(self.value, self.edges)
         return found[:1] + tuple(edge for edge in found[1:] if not self.is_remote(edge))
 
@@ -143,7 +148,7 @@ def boundary(
 
 
 def searched(rig: Rig, name: str) -> tuple[float, float]:
-    """Range of a parameter in which `boundary` searches unless another is given, SI units."""
+    """Range of a parameter (SI units) that `boundary` searches by default."""
     return _search(rig, name, rig.kept_zeros(name), 0).searched
 
 
@@ -156,7 +161,7 @@ def _search(rig: Rig, name: str, present: tuple[str, ...], branch: int) -> Searc
 
 
 def _is_numeric(machine: Machine, name: str) -> bool:
-    """True if edges come from numbers on either route: then by matrices, with fewer samples, no symbols to evaluate."""
+    """True if both the equations and the matrices would be evaluated as numbers; matrices need fewer samples then."""
     own = operating_point(machine)
     if is_written_out(own.model) or not (own.exists and in_numbers(machine)):
         return False
@@ -171,7 +176,10 @@ def _matrix_search(rig: Machine, name: str) -> MatrixSearch | MeasuredSearch:
 
 
 def _unknown(rig: Rig, search: Search | MatrixSearch | MeasuredSearch, low: float, high: float) -> str:
-    """Text that names the parameter and the parts of `low` to `high` in which edges are not known; empty if none."""
+    """Text that names the parameter and the parts of `low` to `high` in which its edges are unknown, or "".
+
+    Empty if there are none.
+    """
     if search.hides:
         return f"{search.name} near some values"
     first, last = search.decided
@@ -183,7 +191,7 @@ def _unknown(rig: Rig, search: Search | MatrixSearch | MeasuredSearch, low: floa
 def _where(
     rig: Rig, search: Search | MatrixSearch | MeasuredSearch, gap: tuple[float, float], low: float, high: float
 ) -> str:
-    """Text for a part `gap` of the range from `low` to `high`: "below 3 Pa"."""
+    """Text that describes a part `gap` of the range from `low` to `high`, such as "below 3 Pa"."""
     first, last = (format_quantity(end, search.role.unit, area=rig.area_of(search.name)) for end in gap)
     if gap[0] <= low and gap[1] < high:
         return f"below {last}"
@@ -236,7 +244,7 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
         and (address.value != 0 or not address.role.structural or name in present or name in zeros)
     ]
     found, cut, share, left = [], [], 0, _TERMS
-    while asked and left // len(asked) > share:  # repeat slow searches with the terms that others did not need
+    while asked and left // len(asked) > share:  # repeat slow searches with the terms that fast searches left over
         missing, share = [], left // len(asked)
         for name, address in asked:
             with at_most(share) as allowance:
@@ -260,7 +268,12 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
 
 
 def _zero_dampings(rig: Rig) -> tuple[str, ...]:
-    """Names of a machine's dampings that are 0 but may be set; none if it is undamped: any damping decides then."""
+    """Names of a machine's dampings that are 0 but may be changed.
+
+    Empty if the machine is undamped: any damping decides then.
+
+    none if the machine is undamped, as any damping decides then.
+    """
     found = [name for name, one in rig.parameters().items() if name.endswith(".damping") and one.value == 0]
     if not found or by_matrices(rig) or is_undamped(operating_point(rig)):
         return ()
@@ -268,7 +281,7 @@ def _zero_dampings(rig: Rig) -> tuple[str, ...]:
 
 
 def without_edges(found: Sequence[Margin], lost: Sequence[Boundary]) -> tuple[Margin, ...]:
-    """Margins without the edges in `lost`, the most critical first."""
+    """Margins recomputed without the edges in `lost`, the most critical first."""
     if not lost:
         return tuple(found)
     gone = set(lost)
@@ -285,7 +298,7 @@ def _margin(name: str, unit: str, value: float, edges: tuple[Boundary, ...], sea
 
 
 def _urgency(margin: Margin) -> tuple[bool, float]:
-    """Sorting key: `doublings` to the edge, remote edges last; then values of zero; then parameters without edge.
+    """Sorting key: number of doublings to the edge; remote edges, zero values and missing edges come last.
 
     Distances that differ by rounding only give equal keys, so that parameters stay in the order of the rig.
     """
@@ -298,7 +311,7 @@ def _urgency(margin: Margin) -> tuple[bool, float]:
 
 
 def edges_about(own: float, edges: Sequence[Boundary]) -> tuple[Boundary, ...]:
-    """Edges next to a value of their parameter, below and above it, nearest first."""
+    """The next edge below a parameter's value `own` and the next above, nearer one first."""
     at = {edge.value: edge for edge in edges}
     return tuple(at[end] for end in ends_about(own, list(at), edges[0].unit if edges else ""))
 
@@ -320,6 +333,6 @@ def _checked_range(name: str, role: Parameter, between: Sequence[Any]) -> tuple[
 
 
 def oscillatory_edge(distances: Sequence[Margin]) -> Boundary | None:
-    """First edge, in margins sorted nearest first, at which oscillations begin; None if there is none."""
+    """Edge of the first margin (nearest first) at which oscillations begin; None if there is none."""
     edges = [one.edge for one in distances if one.edge is not None]
     return next((edge for edge in edges if edge.kind == "oscillatory" and edge.stable != "neither"), None)

@@ -20,11 +20,11 @@ from steadyslip.linear.undamped import grows, is_undamped, squares
 from steadyslip.machine.rig import Rig
 
 QUIET, GROWS = 10, 11  # no root grows, a root grows; distinct from the values of `status`
-ROUNDS = 4  # refinements of a minimum of the gap between two roots; each narrows its bracket
+ROUNDS = 4  # number of times that the bracket of a least distance between two roots is narrowed by a factor `SPLIT`/2
 
 
 def gaps(u: ComplexArray) -> Array:
-    """Least distance between neighbours of sorted squares of roots (..., n), relative to their size; inf if n < 2."""
+    """Least distance between neighbours in sorted squares of roots u (..., n), relative to their size; inf if n < 2."""
     apart = np.abs(u[..., 1:] - u[..., :-1]) / np.abs(u[..., 1:] + u[..., :-1])
     return np.asarray(np.min(np.where(np.isnan(apart), np.inf, apart), axis=-1, initial=np.inf))
 
@@ -44,7 +44,7 @@ def near_couplings(grid: Array, gaps_at: Callable[[Array], Array]) -> Array:
 
 
 def meeting(u: ComplexArray) -> tuple[str, float]:
-    """Kind and frequency (rad/s) of an edge with squares of roots `u` beside it: two meet, or one passes zero."""
+    """Kind and frequency (rad/s) of an edge, from squared roots `u` beyond it: two squares meet, or one passes zero."""
     growing = u[np.isfinite(u) & ((u.imag != 0) | (u.real > 0))]
     paired = growing[growing.imag != 0]
     return ("coupling", float(np.sqrt(-paired.real.mean()))) if paired.size else ("divergence", 0.0)
@@ -62,18 +62,18 @@ class UndampedSearch(Search):
             kind = self._kinds_of_growth(x)
             at = np.flatnonzero((kind[1:] != kind[:-1]) & (kind[1:] != UNKNOWN) & (kind[:-1] != UNKNOWN))
             found = [self._edge(x[i], x[i + 1], kind[i], kind[i + 1]) for i in at]
-        zero = self.role.domain.low == 0  # 0 is the end of the domain then, not an edge
+        zero = self.role.domain.low == 0  # a change at 0, the end of the domain, is not an edge
         return tuple(one for one in found if low <= one.value <= high and not (zero and one.bracket[0] == 0))
 
     def _kinds_of_growth(self, x: Array) -> NDArray[np.int64]:
-        """QUIET, GROWS, ABSENT or UNKNOWN at values (n,)."""
+        """Array (n,) with QUIET, GROWS, ABSENT or UNKNOWN for each parameter value (n,)."""
         point = self.values(x)
         found = status(point)
         known = (found != ABSENT) & (found != UNKNOWN)
         return np.where(known, np.where(grows(point), GROWS, QUIET), found)
 
     def _edge(self, low: float, high: float, below: int, above: int) -> Boundary:
-        absent = low if below == ABSENT else high  # at a sample, absence is not due to rounding
+        absent = low if below == ABSENT else high  # `low` and `high` are samples, where absence is not due to rounding
         for _ in range(int(60 / np.log2(SPLIT))):  # 60: more than the bits of a float
             x = np.linspace(low, high, SPLIT + 1)
             at = max(1, int(np.argmax(self._kinds_of_growth(x) != below)))

@@ -14,8 +14,8 @@ import numpy as np
 from steadyslip.core.expressions import Choose
 
 ROUNDING = 8 * float(np.finfo(float).eps)  # a difference smaller than this share of its terms counts as 0
-APART = 1e6  # factor between the parameter values at which `linear_split` takes the polynomial
-_LEFT = 1e-13  # relative size up to which a difference of coefficients is rounding error
+APART = 1e6  # factor between neighbouring parameter values at which `linear_split` evaluates the polynomial
+_LEFT = 1e-13  # difference of coefficients, relative to the larger, up to which the difference is rounding error
 _LINEAR = 1e-10  # relative deviation from linearity that rounding alone can cause
 Polynomial = Sequence[Any]
 
@@ -47,7 +47,7 @@ def is_ill_posed(c: Polynomial, spare: Any) -> Any:
 
 
 def even_odd(c: Polynomial) -> tuple[list[Any], list[Any]]:
-    """E and O with c(iβ) = E(β²) + iβ O(β²), as polynomials in β²."""
+    """Polynomials E and O in β² with c(iβ) = E(β²) + iβ O(β²)."""
     signed = [-one if i % 4 > 1 else one for i, one in enumerate(c)]
     return signed[0::2], signed[1::2] or [0.0 * signed[0]]
 
@@ -100,13 +100,18 @@ def real_edges(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> tuple
 def linear_split(
     low: Polynomial, own: Polynomial, high: Polynomial, choose: Choose = np.where
 ) -> tuple[list[Any], list[Any], Any]:
-    """p and q of p + f q, from its values at f = 1/`APART`, 1 and `APART`; and True where these are linear in f."""
+    """Polynomials p and q of p + f q, from its values at f = 1/`APART`, 1 and `APART`.
+
+    The third result is True where the values are linear in f.
+
+    And True where the coefficients are linear in f.
+    """
     p: list[Any] = []
     q: list[Any] = []
     straight: Any = True
 
     def beyond(difference: Any, of: Any) -> Any:
-        """Difference, or 0 if it is rounding error, which would cause a spurious edge at a value of 1e-20."""
+        """The difference, or 0 if it is rounding error, which would cause a spurious edge near 1e-20."""
         return choose(abs(difference) <= _LEFT * abs(of), 0.0, difference)
 
     for first, middle, last in zip(low, own, high, strict=True):
@@ -120,15 +125,18 @@ def linear_split(
 
 
 def is_hurwitz(c: Polynomial, choose: Choose, spare: int) -> Any:
-    """True if all roots lie left of the axis and the highest coefficient is positive; `spare` highest may be 0.
+    """True if all roots of a polynomial lie left of the axis and its highest coefficient that is not 0 is positive.
 
-    For one rig. For arrays see `polynomials.is_hurwitz`, which also handles coefficients a hundred decades apart.
+    The `spare` highest coefficients may be 0. For one rig; for arrays see `polynomials.is_hurwitz`, which also handles
+    coefficients a hundred decades apart.
     """
     return judged(c, choose, spare, spare)[0]
 
 
 def judged(c: Polynomial, choose: Choose, spare: Any, most: int) -> tuple[Any, list[Any]]:
-    """Result of `is_hurwitz`, and factors of three functions, one of which changes sign wherever that result changes.
+    """Result of `is_hurwitz`, and factors of three functions.
+
+    Wherever the result changes, one of the functions changes sign.
 
     `spare` of the highest coefficients may be 0; `spare` is at most `most`.
 

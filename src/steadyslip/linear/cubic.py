@@ -42,7 +42,7 @@ def coefficients(
 def hopf_line(
     *, f: Num, S: Num, r: Num, f1: Num, mu: Num, B0: Num, B1: Num, B2: Num, B3: Num, m: Num
 ) -> tuple[Num, Num]:
-    """N and D of the condition a2 a1 > a3 a0, which reads D k > N.
+    """N and D of the Hurwitz condition a2 a1 > a3 a0, written as D k > N.
 
     D > 0: stable above N/D; D < 0: stable only below. The printed eq. 20 has f1(λ1 − λ) for r f (λ1 − λ)
     in N, and lacks B1 f1 in D; its inequality for D < 0 is not mentioned in the paper.
@@ -78,8 +78,8 @@ def stable_interval(
 ) -> tuple[Num, Num]:
     """Interval of k > 0 (Pa/m) in which all Hurwitz conditions are satisfied.
 
-    Conditions: a3 >= 0, a2 > 0 (no k in them), D k > N, and a0 > 0, that is (1 + μB2) k > −μB3. They are valid without
-    inertia (a3 = 0) too: D k > N is a1 > 0 then.
+    Conditions: a3 >= 0 and a2 > 0, which do not contain k, D k > N, and a0 > 0, that is (1 + μB2) k > −μB3. They are
+    valid without inertia (a3 = 0) too: D k > N is a1 > 0 then.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def stable_interval(
 
 
 def without_gain(low: Num, high: Num, gain: Num, choose: Choose = np.where) -> tuple[Num, Num]:
-    """Interval of the spring's own stiffness, from the interval of its sum with a controller's gain."""
+    """Interval of the stiffness of the spring alone, from the interval of its sum with the gain of a controller."""
     if choose is np.where and not np.ndim(gain) and gain == 0:
         return low, high
     left, most = low - gain, high - gain
@@ -109,7 +109,7 @@ def without_gain(low: Num, high: Num, gain: Num, choose: Choose = np.where) -> t
 
 
 def positive(value: Num, choose: Choose = np.where) -> Num:
-    """`value` > 0; for an array that is positive everywhere plain True, which saves the cost of masks."""
+    """True where `value` > 0; plain True for an array that is positive everywhere, which avoids the cost of masks."""
     if choose is not np.where:
         return value > 0
     if np.ndim(value) == 0:
@@ -125,7 +125,10 @@ def unless(valid: Num, value: Num, choose: Choose = np.where) -> Num:
 
 
 def _half_line(low: Num, high: Num, slope: Num, right: Num, valid: Num, choose: Choose) -> tuple[Num, Num, Num]:
-    """Intersect (low, high) with slope·k > right; fast if all slopes are positive."""
+    """Intersection of the interval (low, high) with slope·k > right, and the new `valid`.
+
+    Fast if all slopes are positive.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         if positive(slope, choose) is True:
             return (low if np.ndim(right) == 0 and right == 0 else np.maximum(low, right / slope)), high, valid

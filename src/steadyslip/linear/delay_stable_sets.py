@@ -29,20 +29,20 @@ from steadyslip.linear.roots import Array, quietly, roots
 from steadyslip.linear.waves import difference_of_squares, im_of_product
 
 # Limits of the search, chosen by trial: computing time against how many windows are found.
-_TURNS = 100  # periods of an oscillation during the longest delay beyond which windows are not searched
-_STEPS = 8  # values of θ per decade at which the fastest possible oscillation is estimated
-_FEW = 8  # largest number of growing roots at which a window may be near (as in `search`)
+_TURNS = 100  # number of periods during the longest delay above which windows are not searched
+_STEPS = 8  # number of values of θ per decade at which the highest possible frequency is estimated
+_FEW = 8  # with more growing roots no stable window is assumed to be near (as in `search`)
 _TOWARDS = 10.0 ** -np.arange(1, 9)  # relative distances of samples from a value at which equations become ill-posed
-_CLOSE = 1e-3  # roots must be known this close (relative) to an ill-posed value for no other edge to lie between
+_CLOSE = 1e-3  # relative distance from an ill-posed value within which no other edge is assumed to lie
 _HALVINGS = 50  # bisections of a bracket of an eighth of a decade, down to rounding
-_SPARE = 0.1  # share of the undelayed term's excess over the others that is added to each weight, so that none is zero
-_TIMES_CUT, _PIECES = 3, 4  # number of times that an interval of θ without bound is cut, and pieces of each cut
-_ON_AXIS = 1e-3  # relative imaginary part up to which a root of a polynomial counts as real; a double one has 1e-8
-_MANY = 20_000  # periods during the longest delay, at the rig's own value, above which the search is refused
+_SPARE = 0.1  # share of (undelayed term − sum of other terms) that is added to each weight, so that no weight is zero
+_TIMES_CUT, _PIECES = 3, 4  # times that an interval of θ without frequency bound is cut, each time into 4 pieces
+_ON_AXIS = 1e-3  # relative imaginary part up to which a root counts as real; rounding gives a double root some 1e-8
+_MANY = 20_000  # number of periods during the longest delay, at the rig's value, above which the search is refused
 _ROUNDING = 1e-12  # relative rounding error of edges θ
 _CORNER = 1e-8  # relative rounding error of edges θ at which a root comes from infinity
 _TOUCHED = 1e-7  # relative width up to which a window is rounding error of a root that touches the axis: ~sqrt(eps)
-_PLAIN = 1e-6  # |Re ds/dθ| over |ds/dθ| below which a root may move along the axis, so that roots are counted anew
+_PLAIN = 1e-6  # |Re ds/dθ| over |ds/dθ| below which a root may move along the axis; roots are then counted again
 
 
 def empty_set() -> StableSet:
@@ -63,7 +63,9 @@ def delay_set(p: Array, q: Array, spare: int) -> StableSet:
 
 @quietly
 def delay_set_among(c: Array, h: Array, sets: Sets, late: NDArray[np.bool_], spare: int) -> StableSet | None:
-    """Stable set of one delay θ > 0 (s) of a rig with several; None where its edges are too many to separate.
+    """Values of one delay θ > 0 (s) at which a rig with several delays is stable.
+
+    None where edges are too many to separate.
 
     `c` (m, n+1) are the coefficients of Σ p_j(s) exp(−s h_j), `h` (m,) the delays without θ; `sets` (m, d) is True
     where a delay acts in a term, `late` (m,) where θ does. The `spare` highest powers may be missing.
@@ -145,7 +147,8 @@ def _edges_of_ill_posed(p: Array, q: Array, sets: Sets, spare: int, theta: Array
     tops = tops[sides[0] != sides[1]]
     lost = _ill_posed(p, q, sets, spare, theta)
     at = np.flatnonzero(lost[1:] != lost[:-1])
-    at = at[np.searchsorted(tops, theta[at]) == np.searchsorted(tops, theta[at + 1])]  # without a corner between
+    # without an exact edge between them
+    at = at[np.searchsorted(tops, theta[at]) == np.searchsorted(tops, theta[at + 1])]
     left, right = theta[at], theta[at + 1]
     for _ in range(_HALVINGS if at.size else 0):
         middle = 0.5 * (left + right)
@@ -157,10 +160,10 @@ def _edges_of_ill_posed(p: Array, q: Array, sets: Sets, spare: int, theta: Array
 def _known(
     p: Array, q: Array, h: Array, sets: Sets, theta: Array, known: NDArray[np.bool_], edges: Array
 ) -> tuple[float, float]:
-    """Lowest and highest θ, around 1, up to which windows are known.
+    """Lowest and highest θ, below and above 1, between which all stable windows are known.
 
     Windows are known at samples `known`, whose oscillations are slow enough to be followed. At other samples roots are
-    counted. The sample is accepted if many roots grow, so that nothing nearby is stable; or if a value at which the
+    counted. Such a sample is accepted if many roots grow, so that nothing nearby is stable; or if a value at which the
     equations become ill-posed is so close, with as many roots as at the sample before, that no other edge can lie
     between. With several delays counts take too long there, and this is assumed within the distance of two samples.
     """
@@ -191,7 +194,7 @@ def _windows(
         return None
     theta, beta = candidates
     ends = np.concatenate([[low], theta, [high]])
-    probes = np.sqrt(ends[:-1]) * np.sqrt(ends[1:])  # between two neighbours no root crosses the axis
+    probes = np.sqrt(ends[:-1]) * np.sqrt(ends[1:])  # one between each two neighbouring edges
     count = _count_each if len(h) <= 2 else _count_by_crossings  # with one delay counts are fast
     well_posed = ~is_ill_posed(columns(p[0] + probes[:, None] * q[0]), spare)
     right = count(p, q, h, sets, theta, beta, probes)
@@ -263,7 +266,10 @@ def _largest_between(p: Array, q: Array, sets: Sets, theta: Array) -> float:
 
 
 def _bound_of_terms(c: Array, sets: Sets) -> Array:
-    """Upper bound (rows,) of frequencies of roots on the axis, for c (rows, m, n+1); inf where there is none."""
+    """Upper bounds (rows,) of frequencies of roots on the axis for c (rows, m, n+1); inf where none exists.
+
+    Inf where no bound exists.
+    """
     bound = bound_on_axis(c, sets)
     where = leads(c) & np.isfinite(bound)
     bound[where] = np.minimum(bound[where], _last_crossing(c[where]))
@@ -271,7 +277,7 @@ def _bound_of_terms(c: Array, sets: Sets) -> Array:
 
 
 def _last_crossing(c: Array) -> Array:
-    """Frequency (rows,) beyond which at iω the term without delay is larger than all others, for c (rows, m, n+1).
+    """Frequency (rows,) above which the term without delay exceeds all others together, for c (rows, m, n+1).
 
     For the highest power it must be larger (`leads`). Cauchy and Schwarz: (Σ|p_j|)² <= Σ w_j Σ|p_j|²/w_j, exact for two
     terms; with the highest coefficients as w_j nearly exact at high frequency.

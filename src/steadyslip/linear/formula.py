@@ -1,4 +1,4 @@
-"""The critical stiffness of the user's own rig, or the edge in another parameter, as a formula."""
+"""Formulas for the critical stiffness of a given rig, or for the edge of stability in another parameter."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from steadyslip.model.linearisation import characteristic_coefficients
 LONGEST = 4.0
 """Time limit (s) of each of two simplifications; an expression that takes longer is not simplified."""
 LEGIBLE, SHORT = 60, 3
-"""Most operations of a formula that is written as one equation, and of a part that is written without a letter."""
+"""Most operations of a formula written as one equation, and of a quantity that gets no letter and equation."""
 LARGEST, LONG = 4, 400
-"""Highest degree of the characteristic polynomial, and most operations of a formula, for which it is written."""
+"""Limits above which no formula is written: degree of the characteristic polynomial; operations of the formula."""
 _LETTERS = {"mu": "mu_ss", "f1": "f_1"} | {f"B{i}": f"B_{i}" for i in range(4)}
 MU_SS = sp.Symbol("mu_ss", real=True)
 MEANINGS = {
@@ -62,20 +62,20 @@ def formula(rig: Slider | Machine, along: str | None = None) -> sp.Eq:
     sympy.Eq
         ``k_cr = N/D`` (Pa/m along the sliding direction); with a position controller ``k_cr + kp = N/D``. In
         terms of the rig's parameters, the steady normal stress ``sigma_ss`` and the steady friction coefficient
-        ``mu_ss``. Stable above k_cr while D > 0, below while D < 0 (theory 3; eq. 20 corrected). Of another
-        parameter, or of a machine, where the Hurwitz condition of the characteristic polynomial vanishes;
-        `stable_values` tells which side is stable, and whether another condition fails before.
+        ``mu_ss``. Stable above k_cr while D > 0, below while D < 0 (theory 3; eq. 20 corrected). For another
+        parameter, or for a machine, the value at which the last but one Hurwitz determinant vanishes;
+        `stable_values` tells which side is stable, and whether another Hurwitz condition fails nearer.
 
     Raises
     ------
     NotAvailable
-        If there is no short formula: of a slider with several memory variables or none, or integral control; of another
-        parameter where the characteristic polynomial has a degree above four, or the condition does not depend on it
-        linearly. The boundary is a root of a polynomial then, which `stable_values` solves.
+        If there is no short formula: for the stiffness of a slider with several memory variables, none, or integral
+        control; for another parameter if the characteristic polynomial has a degree above four, or the Hurwitz
+        determinant does not depend linearly on the parameter. `stable_values` then computes the edge as a number.
 
     Notes
     -----
-    It is written as short as SymPy manages in `LONGEST` seconds for each of two steps, else unsimplified.
+    Each of two simplifications by SymPy is stopped after `LONGEST` seconds; the formula is then longer.
 
     Examples
     --------
@@ -100,7 +100,10 @@ def _name(rig: Slider | Machine, along: str | None) -> str:
 
 @cached
 def _condition(model: Model, name: str) -> sp.Eq:
-    """Equation for a parameter at which the last but one Hurwitz determinant vanishes: roots on the imaginary axis."""
+    """Equation for the value of a parameter at which the last but one Hurwitz determinant is zero.
+
+    There two roots are imaginary.
+    """
     symbol, c = model.parameters.get(name), tuple(map(model.written, characteristic_coefficients(model)))
     degree, numbers = len(c) - 1, f"; stable_values(rig, {name!r}) gives its edges as numbers"
     if symbol is None:
@@ -171,7 +174,10 @@ def formula_in_parts(rig: Slider | Machine, along: str | None = None) -> list[sp
 
 
 def _gathered(value: sp.Expr) -> sp.Expr:
-    """Sum with common factors of its terms taken out; roots and functions are kept unexpanded."""
+    """The sum with common factors taken out of each of its terms; roots and functions are not expanded.
+
+    Powers with broken exponents and functions are not expanded.
+    """
     kept = [one for one in sp.ordered(value.atoms(sp.Pow, sp.Function)) if one.is_Function or not one.exp.is_Integer]
     names = {one: inner_symbol(f"kept_{i:03d}") for i, one in enumerate(kept)}
     terms = [sp.factor(term) for term in sp.Add.make_args(value.xreplace(names))]
@@ -209,7 +215,10 @@ def _in_time(work: Callable[[], sp.Expr], otherwise: sp.Expr) -> sp.Expr:
 
 
 def _with_mu(expression: sp.Expr, mu: sp.Expr, levels: list[sp.Symbol]) -> sp.Expr:
-    """Write mu_ss for the steady friction coefficient wherever one of its reference values `levels` occurs in it."""
+    """The expression with the steady friction coefficient `mu` written as mu_ss.
+
+    It is recognised by one of its reference values, `levels`.
+    """
     reference = next((symbol for symbol in levels if mu.diff(symbol) == 1), None)
     if reference is None:
         return expression
@@ -217,7 +226,7 @@ def _with_mu(expression: sp.Expr, mu: sp.Expr, levels: list[sp.Symbol]) -> sp.Ex
 
 
 def _shortest(numerator: sp.Expr, denominator: sp.Expr) -> sp.Expr:
-    """Quotient with common factors cancelled, factored where that is shorter, with positive terms first."""
+    """Quotient with common factors cancelled; numerator and denominator are factored where that is shorter."""
     top, bottom = sp.fraction(sp.cancel(sp.together(numerator / denominator)))
     top, bottom = (min((sp.factor(part), part), key=sp.count_ops) for part in (top, bottom))
     if bottom.subs(dict.fromkeys(bottom.atoms(sp.tan), 0)).could_extract_minus_sign():
@@ -226,7 +235,7 @@ def _shortest(numerator: sp.Expr, denominator: sp.Expr) -> sp.Expr:
 
 
 def _without_minus(product: sp.Expr) -> sp.Expr:
-    """Product with a leading minus sign moved into a sum: b − a for −(a − b)."""
+    """The product with a leading minus sign moved into one of its factors that is a sum: b − a for −(a − b)."""
     sign, factors = product.as_coeff_mul()
     sums = [factor for factor in factors if factor.is_Add]
     if sign >= 0 or not sums:

@@ -15,12 +15,12 @@ from steadyslip.model.point import operating_point
 # Chosen by trial: computing time against missed resonances.
 PLACES = 200  # number of periods, evenly spaced in their logarithm, at which the gain is computed
 PROMINENCE = 0.01  # least rise of ln(gain) above the minima on both sides of a resonance
-BESIDE = np.linspace(-8, 8, 33)  # further periods: distances from the period of each mode, in widths of its peak
+BESIDE = np.linspace(-8, 8, 33)  # further periods, near each mode: distances from its period, in widths of its peak
 SHARPNESS = 1e-5  # tolerance of a resonance's period, relative to the spacing of neighbouring periods
 
 
 def transfer(rig: Slider | Machine, input: str, output: str, periods: Array) -> Array:
-    """Complex transfer function from an input to an observable at periods (s), SI units; delays give e^(−iωτ)."""
+    """Complex transfer function G(iω) from an input to an observable at the given periods (s), in SI units."""
     return _TransferFunction(rig, input, output)(periods)
 
 
@@ -48,7 +48,9 @@ class _TransferFunction:
 
 
 def resonances(rig: Slider | Machine, input: str, output: str, shortest: float, longest: float) -> Array:
-    """Resonances in a range of periods (s), rows of period (s), gain and phase (degrees), largest gain first; (r, 3).
+    """Resonances in a range of periods (s), the largest gain first.
+
+    Rows (r, 3) are period (s), gain and phase (degrees).
 
     Searched on a fine grid and near the period of every mode, so that lightly damped ones are found.
     """

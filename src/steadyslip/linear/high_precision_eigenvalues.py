@@ -18,7 +18,7 @@ from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows
 from steadyslip.model.point import OperatingPoint
 
-_DIGITS = (50, 100, 200, 400, 800, 1100)  # attempts; `_SHARE` of 1100 is more than the 308 decades of floats
+_DIGITS = (50, 100, 200, 400, 800, 1100)  # numbers of digits tried; 1100 suffice, as `_SHARE` of them exceeds 308
 _SHARE = 0.3  # an eigenvalue more decades above the typical rate than this share of the digits counts as infinite
 _PLACE = 1.2345678  # shift at which the matrix is inverted, in units of the typical rate: not an eigenvalue
 _SAME = 1e-13  # relative tolerance between an eigenvalue at a number of digits and at half of it
@@ -26,7 +26,7 @@ _NEARLY = 1e-9  # relative tolerance between the eigenvalues here and those of a
 _NEWTON_DIGITS, _MOST_STEPS = (
     60,
     30,
-)  # digits: three times those of `_ARRIVED`; a few steps suffice from a start of 16 digits
+)  # digits: three times those of `_ARRIVED`; from a start of 16 digits Newton's method needs only a few steps
 _ARRIVED = 1e-20  # relative size of the last step of Newton's method; the next would change no digit of a float
 
 
@@ -91,7 +91,7 @@ def precise_root(point: OperatingPoint, near: complex) -> complex | None:
 
 
 def _summed(table: list[Any], terms: list[Any], size: int) -> Any:
-    """Square matrix (size, size) of sums of `terms`, with coefficients from `table`, entry by entry in rows."""
+    """Square matrix (size, size) whose entries, row by row, are sums of `terms` with coefficients from `table`."""
     import mpmath
 
     many = len(terms)
@@ -102,7 +102,7 @@ def _summed(table: list[Any], terms: list[Any], size: int) -> Any:
 
 @cached
 def _precise_matrix(model: Model) -> tuple[list[tuple[int, ...]], PreciseFunction, PreciseFunction]:
-    """Powers of s and delays in the characteristic matrix; functions of mpmath numbers for coefficients and delays."""
+    """Powers of s and of exp(−s delay) in the characteristic matrix; mpmath functions of coefficients and delays."""
     powers, entries = matrix_entries(model)
     arguments = list(model.arguments)
     return powers, PreciseFunction(arguments, entries), PreciseFunction(arguments, list(model.delays))
@@ -167,7 +167,10 @@ def _pencil(p0: Any, p1: Any, p2: Any) -> tuple[Any, Any]:
 
 @cached
 def matrix_entries(model: Model) -> tuple[list[tuple[int, ...]], list[sp.Expr]]:
-    """Powers of s and of exp(−s delay) in the characteristic matrix; coefficients of each, entry by entry in rows."""
+    """Powers of s and of exp(−s delay) in the characteristic matrix, and the coefficients of each of its entries.
+
+    Entries are taken row by row; each has one coefficient per power.
+    """
     entries = [entry for row in characteristic_rows(model).values() for entry in row]
     powers = sorted({own for entry in entries for own in entry})
     return powers, [entry.get(own, sp.Integer(0)) for entry in entries for own in powers]

@@ -16,9 +16,9 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.posed import late_on_springs, spare_powers
 from steadyslip.model.range import characteristic, delays_in_terms, quasipolynomial
 
-_FAR = 1e12  # edges further than this factor from the parameter's size are rounding error of infinity or zero
+_FAR = 1e12  # edges more than this factor from the parameter's size are at infinity or zero, apart from rounding
 _FACTORS = np.array([1 / APART, 1.0, APART])  # multiples of the parameter's size at which the polynomial is evaluated
-_SIZES = 3  # attempts to find a size at which p and f q have coefficients of similar size; by trial
+_SIZES = 3  # most corrections of the parameter's size until p and q have coefficients of similar size; by trial
 _WINDOWS = 8  # stable intervals kept per rig with delay in arrays; by trial: memory against completeness
 
 
@@ -44,10 +44,10 @@ def most_values(point: OperatingPoint) -> int:
 
 
 def sets_of(point: OperatingPoint, name: str, size: Array | None = None, *, edges: bool = False) -> Array:
-    """Stable intervals of one parameter for arrays of rigs, SI units, (..., m, 2), NaN padded.
+    """Stable intervals of one parameter for arrays of rigs, (..., m, 2), in SI units, padded with NaN.
 
     `size` (...) are positive values to search around for rigs with delay; by default the rigs' own values. With `edges`
-    an end at which only the searched range ends, under a delay, is NaN.
+    an end of an interval that is only the end of the searched range (with delay) is NaN.
 
     Raises
     ------
@@ -77,7 +77,11 @@ def sets_of(point: OperatingPoint, name: str, size: Array | None = None, *, edge
 
 
 def linear_sets(point: OperatingPoint, name: str) -> StableSet:
-    """Stable sets of one parameter for arrays of rigs without delay; they do not depend on the rigs' own values of it.
+    """Stable sets of one parameter for arrays of rigs without delay.
+
+    They do not depend on the parameter's values in the rigs.
+
+    They do not depend on the parameter's values in the rigs.
 
     Raises
     ------
@@ -106,7 +110,12 @@ def linear_sets(point: OperatingPoint, name: str) -> StableSet:
 
 
 def _split(c: Array) -> tuple[Array, Array, Array]:
-    """p and q of p + f q from coefficients `c` (3, ...) at the factors f `_FACTORS`; True where they are not linear."""
+    """p and q of p + f q, from coefficients `c` (3, ...) at the factors f in `_FACTORS`.
+
+    The third result is True where `c` is not linear in f.
+
+    And True where `c` is not linear in f.
+    """
     low, own, high = (columns(one) for one in c)
     p, q, straight = linear_split(low, own, high)
     return np.stack(p, axis=-1), np.stack(q, axis=-1), ~np.asarray(straight)
@@ -126,10 +135,14 @@ def _with_far_edges_removed(found: StableSet) -> StableSet:
 def linear_set(
     point: OperatingPoint, name: str, size: float | None = None, reach: tuple[float, float] | None = None
 ) -> StableSet | None:
-    """Stable set of one parameter of a single rig, SI units; None if it does not enter linearly or is not positive.
+    """Stable set of one parameter of a single rig, SI units.
 
-    `size` is the value to start from, by default the rig's own. Windows of rigs with delay are searched up to a factor
-    of a million from it, or in the range `reach` if that is wider.
+    None if the parameter does not enter linearly or is not positive.
+
+    None if the parameter does not enter linearly or is not positive.
+
+    `size` is the value to start from, by default that in the rig. Windows of rigs with delay are searched up to a
+    factor of a million from it, or in the range `reach` if that is wider.
     """
     place = list(point.model.parameters).index(name)
     value = float(point.named()[name]) if size is None else size
@@ -164,7 +177,7 @@ def linear_set(
 def _split_around(
     point: OperatingPoint, name: str, size: float, again: bool
 ) -> tuple[Array, Array, Array, float] | None:
-    """P, Q, delays and size for a single rig with characteristic function P + f Q, the parameter being f times size.
+    """P, Q, delays and size for a single rig whose characteristic function is P + f Q. The parameter is f times size.
 
     With `again` the size is changed until P and Q have coefficients of similar size, so that the result does not depend
     on the value of the parameter. None if the parameter does not enter linearly.
@@ -187,14 +200,19 @@ def _split_around(
 
 
 def _balancing_factor(p: Array, q: Array) -> Array:
-    """Factor f that makes p and f q (..., n+1) similar in size (geometric mean); 1 where they share no power."""
+    """Factor f with which p and f q (..., n+1) have coefficients of similar size.
+
+    It is a geometric mean; 1 if no power is in both.
+
+    1 if no power is in both.
+    """
     both = (p != 0) & (q != 0)
     ratios = np.sum(np.where(both, np.log(np.abs(p)) - np.log(np.abs(q)), 0.0), axis=-1)
     return np.asarray(np.exp(ratios / np.maximum(np.sum(both, axis=-1), 1)))
 
 
 def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
-    """Stable set of a delay; None if delays share it or coefficients are not finite."""
+    """Stable set of a delay; None if it is part of another delay, or coefficients are not finite."""
     sets, delays = delays_in_terms(point.model), point.model.delays
     c, h = quasipolynomial(point)
     if not np.all(np.isfinite(c)):

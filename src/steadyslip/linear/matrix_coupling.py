@@ -19,9 +19,9 @@ from steadyslip.model.numeric.machine_point import MachinesAlong
 from steadyslip.model.numeric.pencil import UNDECIDED, StatePencil
 
 _PART = 1e-6
-"""Relative imaginary part above which two squares of roots are a complex pair. Rounding of a double square makes some
-1e-8; beyond the edge the pair reaches this value within 1e-12 of the parameter."""
-_RISE = 1e-12  # least positive square over the largest; smaller is rounding of the zero of an unsupported body
+"""Relative imaginary part above which two squared roots count as a complex pair. Rounding gives a double square some
+1e-8; 1e-12 (relative) beyond the edge in the parameter, the imaginary part of the pair exceeds the limit."""
+_RISE = 1e-12  # squared root over the largest, up to which it counts as the zero root of an unsupported body
 
 
 class UndampedMatrixSearch(MatrixSearch):
@@ -36,7 +36,7 @@ class UndampedMatrixSearch(MatrixSearch):
             return tuple(self._meeting(x[i], x[i + 1], *pair) for i, *pair in pairs if UNKNOWN not in pair)
 
     def _growing(self, machines: MachinesAlong, sure: bool) -> NDArray[np.int64]:
-        """1 where a root grows, 0 elsewhere, (p,)."""
+        """Array (p,) with 1 for machines of which a root grows, else 0."""
         if not may_take(len(machines.posed) * machines.size**3 // FLOPS):
             return np.full(len(machines.posed), UNDECIDED)
         return growing_squares(squares_along(machines)).astype(np.int64)
@@ -47,7 +47,7 @@ class UndampedMatrixSearch(MatrixSearch):
         )
 
     def _meeting(self, low: float, high: float, below: int, above: int) -> Boundary:
-        """Edge between two values, where two squares meet, one passes zero, or steady sliding ends."""
+        """Edge between two values: there two squared roots meet, one passes zero, or steady sliding ends."""
         if ABSENT in (below, above):
             return self._described(self._end(low, high), 0.0, below, above)
         low, high = self._narrowed(low, high, lambda values: np.asarray(self.statuses(values) != below), 0.0)
@@ -61,7 +61,7 @@ class UndampedMatrixSearch(MatrixSearch):
 
 
 def squares_along(machines: MachinesAlong) -> ComplexArray:
-    """Squares of the roots (1/s²), (p, n), rising in their real part; NaN without steady sliding."""
+    """Squares of the roots (1/s²) of each machine, (p, n), rising in their real part; NaN without steady sliding."""
     found = np.full((len(machines.posed), machines.size), np.nan, dtype=complex)
     for i in np.flatnonzero(machines.balance.exists & machines.posed):
         pencil = machines.pencil(int(i))
@@ -77,7 +77,7 @@ def squares_of(pencil: StatePencil) -> ComplexArray:
 
 
 def growing_squares(u: ComplexArray) -> NDArray[np.bool_]:
-    """True where a root of undamped machines grows: one of its squares (..., n) is complex or positive, (...)."""
+    """True (...) where a root of an undamped machine grows: a squared root u (..., n) is complex or positive."""
     largest = np.max(np.abs(u), axis=-1, initial=0.0)[..., None]
     return np.asarray(np.any((np.abs(u.imag) > _PART * np.abs(u)) | (u.real > _RISE * largest), axis=-1))
 
@@ -90,7 +90,12 @@ def nothing_damps(pencil: StatePencil | None) -> bool:
 
 
 def search_matrices(machine: Machine, name: str) -> MatrixSearch:
-    """Make the search for edges of stability, or of growth if the machine is undamped at all values."""
+    """Search for edges of stability.
+
+    For a machine that is undamped at all values of the parameter, for edges of growth.
+
+    For a machine that is undamped at all values of the parameter, for edges of growth.
+    """
     found = MatrixSearch(machine, name)
     if not found.own.balance.exists or not nothing_damps(found.own.pencil):
         return found

@@ -37,7 +37,7 @@ def require_matrices(machine: Machine) -> MachinePoint:
 
 
 def over(machine: Machine, vary: Vary | None, one: Callable[[MachinePoint], Any]) -> tuple[list[Any], Any]:
-    """Results of a function for every machine of an array, flat, and the checked arrays."""
+    """Results of the function `one` for every machine of an array, as a flat list, and the checked arrays."""
     arrays = checked_arrays(machine, vary or {})
     flat = arrays.flat()
     found = []
@@ -50,7 +50,7 @@ def over(machine: Machine, vary: Vary | None, one: Callable[[MachinePoint], Any]
 
 
 def eigenvalues(machine: Machine, vary: Vary | None) -> Any:
-    """Eigenvalues (1/s), (..., n), by falling real part; NaN without steady sliding and as padding."""
+    """Eigenvalues (1/s), (..., n), by falling real part; padded with NaN, and all NaN without steady sliding."""
 
     def one(point: MachinePoint) -> ComplexArray:
         return point.pencil.eigenvalues if point.balance.exists else np.full(len(point.matrices.names), np.nan + 0j)
@@ -76,7 +76,7 @@ def growth_rate(machine: Machine, vary: Vary | None) -> Any:
 
 
 def stability(machine: Machine, vary: Vary | None) -> Any:
-    """Stability as text, (...)."""
+    """Stability as text for each machine, (...); see `stability_word`."""
     found, arrays = over(machine, vary, stability_word)
     words = np.array(found)
     return arrays.wrap(words.reshape(arrays.shape), "stability", "1") if arrays.shape else str(words[0])

@@ -24,21 +24,21 @@ from steadyslip.model.numeric.change import LowRankChange, Turns, change_between
 from steadyslip.model.numeric.machine_point import MachinePoint, MachinesAlong, absence, machine_point
 from steadyslip.model.numeric.pencil import ILL_POSED, UNDECIDED, StatePencil, real_product
 
-_SHARE = 4  # factor by which samples are fewer than in `search`: 10 per decade
+_SHARE = 4  # samples are fewer than in `search` by this factor: 10 per decade
 _BRACKET = 1e-9  # relative width to which a bracket is narrowed by counting, before Newton's method
 _NEAR = 1e-3  # relative width of a bracket from which Newton's method mostly converges
-_BESIDE = 1e-3  # where steady sliding ends, stability is evaluated this share of the bracket inside
-_FAR = 1e12  # ratio of two values above which the lower one is a zero with rounding error
-_PARTS = 32  # pieces of a bracket of a small machine, counted together
+_BESIDE = 1e-3  # distance, over the bracket, from the end of steady sliding at which stability is evaluated
+_FAR = 1e12  # ratio of two values above which the smaller value counts as a zero with rounding error
+_PARTS = 32  # pieces into which a bracket is cut for a small machine, whose roots are counted for all at once
 _HALVINGS = 60  # most halvings of a bracket: down to neighbouring numbers
-_SMALL = 64  # rows of a pencil up to which eigenvalues cost less than turns of a response
+_SMALL = 64  # rows of a pencil up to which computing eigenvalues is faster than following a response's argument
 FLOPS = 40  # eigenvalues of n rows count as n**3/FLOPS terms of `allowance`, by measured time
 _TOGETHER = 2**20  # most entries of matrices that are treated together, 8 MiB
 _NEWTON = 12  # most steps of Newton's method; its convergence is quadratic
-_LIKELY = 3  # number of eigenvalues nearest to the axis, by each measure, that are tried as the one that crosses
+_LIKELY = 3  # number of eigenvalues nearest to the axis, by each of two measures, from which Newton's method starts
 _REACH = 4.0  # largest distance that Newton's method may go, in widths of the bracket
 _LAST = 4 * np.finfo(float).eps  # relative step at which Newton's method has converged
-_ROUNDING = 1e-11  # relative step below which a step that no longer falls is rounding error of large matrices
+_ROUNDING = 1e-11  # relative step below which Newton's method ends if steps no longer fall: rounding of large matrices
 _APART = 1e-7  # relative step of differences of the determinant along a nonlinear parameter: ~sqrt(eps)
 _PROBES = (0.5, 2.0, 7.0)  # multiples of a parameter's value at which linearity is tested
 
@@ -71,7 +71,7 @@ class MatrixSearch:
         return abs(self.value) or natural, natural
 
     def grid(self, between: tuple[float, float] | None = None) -> Array:
-        """Values at which roots are counted, in a range or in `searched`."""
+        """Values of the parameter at which roots are counted, in the range `between` or in `searched`."""
         domain = self.role.domain
         if np.isfinite(domain.high):
             found = samples.bounded(domain, _SHARE)
@@ -87,17 +87,20 @@ class MatrixSearch:
 
     @cached_property
     def _small(self) -> bool:
-        """True if roots are counted by eigenvalues: small machines, and machines without steady sliding themselves."""
+        """True if roots are counted by eigenvalues.
+
+        That is so for small machines, and for machines that cannot slide steadily as they are.
+        """
         return not self.own.balance.exists or len(self.own.pencil.a) <= _SMALL
 
     def _pencil(self, value: float) -> StatePencil | None:
-        """Pencil at a value; None without steady sliding."""
+        """Pencil at a value of the parameter; None without steady sliding."""
         return self.own.along(self.name, np.array([value])).pencil(0)
 
     def statuses(self, values: Array, sure: bool = True) -> NDArray[np.int64]:
-        """Status at values (p,): ABSENT, STABLE, UNSTABLE; UNKNOWN where a body is unsupported.
+        """Array (p,) with the status at each value: ABSENT, STABLE, UNSTABLE, or UNKNOWN where a body is unsupported.
 
-        If `sure`, UNKNOWN also where rounding hides whether a root grows.
+        If `sure`, it is UNKNOWN also where rounding hides whether a root grows.
         """
         found = np.full(len(values), UNKNOWN)
         for part in self.parts(len(values)):
@@ -111,7 +114,7 @@ class MatrixSearch:
 
     @cached_property
     def _rows(self) -> int:
-        """Rows of the pencils that the parameter may change."""
+        """Number of rows in the part of the pencil that the parameter may change."""
         return len(self.own.along(self.name, np.array([self.value])).a[0])
 
     def parts(self, count: int) -> list[slice]:
@@ -120,7 +123,12 @@ class MatrixSearch:
         return [slice(start, start + together) for start in range(0, count, together)]
 
     def _growing(self, machines: MachinesAlong, sure: bool) -> NDArray[np.int64]:
-        """Number of growing roots, (p,), ILL_POSED or UNDECIDED; for large machines by turns of a response."""
+        """Array (p,) with the number of growing roots, ILL_POSED or UNDECIDED.
+
+        For large machines it follows from the argument of a response.
+
+        For large machines from the argument of a response.
+        """
         if self._small or self.turns is None:
             count = len(machines.posed)
             if not self._small and not may_take(count * len(self.own.pencil.a) ** 3 // FLOPS):
@@ -152,12 +160,15 @@ class MatrixSearch:
 
     @cached_property
     def change(self) -> LowRankChange | None:
-        """Low-rank change of the pencil by the parameter; None if it changes nothing."""
+        """Low-rank change of the pencil by the parameter; None if the parameter changes nothing."""
         return change_between(self.own.pencil, self._probes[1])
 
     @cached_property
     def turns(self) -> Turns | None:
-        """Turns of a response; None if the parameter changes nothing, or the pencil in too many directions."""
+        """Counts of roots from the argument of a response.
+
+        None if the parameter changes nothing, or too much of the pencil.
+        """
         return None if self.change is None or self.change.is_wide else Turns(self.change)
 
     # -- edges
@@ -198,7 +209,7 @@ class MatrixSearch:
         return tuple(found)
 
     def _lost(self, grid: Array) -> Array:
-        """Values at which steady sliding begins or ends, bracketed by samples `grid`."""
+        """Values at which steady sliding begins or ends, found between the samples `grid`."""
         if not self.steady_changes:
             return np.empty(0)
         there = self._slides(grid)
@@ -222,7 +233,8 @@ class MatrixSearch:
         """Value in a bracket at which steady sliding begins or ends."""
         first, last = self._narrowed(low, high, self._slides, 0.0)
         found = 0.5 * (first + last)
-        return found if abs(found) * _FAR > max(abs(low), abs(high)) else 0.0  # where one end of the bracket is zero
+        # 0 if one end of the bracket is zero and the value is rounding error
+        return found if abs(found) * _FAR > max(abs(low), abs(high)) else 0.0
 
     def _scanned(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
         """Edges by counting roots at samples."""
@@ -235,7 +247,10 @@ class MatrixSearch:
         return tuple(found)
 
     def _edges(self, low: float, high: float, below: int, above: int) -> list[Boundary]:
-        """Edges between two values with different status: one, or two where steady sliding ends beyond an edge."""
+        """Edges between two values of different status: one, or two if steady sliding ends beyond an edge.
+
+        Where steady sliding ends there, it may end beyond another edge.
+        """
         if ABSENT not in (below, above):
             return [self._edge(low, high, below, above)]
         end = self._end(low, high)
@@ -311,7 +326,7 @@ class MatrixSearch:
         return middle, next(self._likely_of_roots(pencil))
 
     def _likely(self, pencil: StatePencil) -> Iterator[float]:
-        """Frequencies (rad/s) at which a root may cross the axis near a pencil, the likeliest first."""
+        """Frequencies (rad/s) at which a root of nearby machines may cross the axis, the likeliest first."""
         if not self._small and self.turns is not None:
             yield from self.turns.least(self.turns.change.core_of(pencil), _LIKELY)
         yield from self._likely_of_roots(pencil)
@@ -324,7 +339,7 @@ class MatrixSearch:
         yield from (float(roots[i].imag) for i in dict.fromkeys(likely.tolist()))
 
     def _crossing_step(self, value: float, beta: float) -> tuple[float, float] | None:
-        """Newton step of value and frequency towards a root on the imaginary axis, by the eigenvalue's own slopes."""
+        """Newton step of value and frequency towards a root on the axis, from derivatives of an eigenvalue."""
         step = _APART * (abs(value) or self._sizes[0])
         machines = self.own.along(self.name, np.array([value, value + step]))
         here, there = machines.pencil(0), machines.pencil(1)
@@ -345,7 +360,7 @@ class MatrixSearch:
 
 
 def _followed(here: StatePencil, there: StatePencil, near: complex, step: float) -> tuple[complex, complex]:
-    """Eigenvalue of a pencil near `near` (1/s), and its derivative by the parameter (first-order perturbation)."""
+    """Eigenvalue of the pencil `here` near `near` (1/s), and its derivative by the parameter (to first order)."""
     u, v = here.vectors(near)
     rates, places = real_product(here.e, v), real_product(here.a, v)
     normal = u @ rates
@@ -355,20 +370,20 @@ def _followed(here: StatePencil, there: StatePencil, near: complex, step: float)
 
 
 def _between(low: float, high: float) -> float:
-    """Value between two others: the geometric mean if they have one sign and are not too far apart, else the mean."""
+    """Geometric mean of two values if they have the same sign and a moderate ratio, else their arithmetic mean."""
     ratio = high / low if low else 0.0
     return float(np.sign(low) * np.sqrt(low * high)) if 1 / _FAR < ratio < _FAR else 0.5 * (low + high)
 
 
 def _distinct(values: Array, omega: Array) -> tuple[Array, Array]:
-    """Rising values, with their frequencies, without duplicates to within rounding."""
+    """The rising values with their frequencies, without values that differ from the one before by rounding only."""
     keep = np.diff(values, prepend=-np.inf) > 1e-12 * np.abs(values)
     return values[keep], omega[keep]
 
 
 @cached
 def decay_rate(point: MachinePoint) -> float:
-    """Fastest decay rate of the contacts' memory (1/s), zero without memory."""
+    """Fastest decay rate (1/s) of the memory of all contacts; zero if no contact has memory."""
     from steadyslip.model.numeric.balance import state_of
 
     rates = [0.0]

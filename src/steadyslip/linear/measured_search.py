@@ -1,7 +1,7 @@
 """Edges of stability in one parameter of a machine whose structure is a measured response.
 
-Growing roots are counted along the parameter; an edge lies between two values of which one is surely stable and the
-other surely is not. What errors of the response leave open is the edge's bracket.
+Growing roots are counted along the parameter; an edge lies between two values if the machine is surely stable at one
+and surely unstable at the other. The bracket of the edge has the values at which errors of the response leave it open.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from steadyslip.linear.status import STABLE, UNKNOWN, UNSTABLE
 from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
 
-_DECADES, _PER_DECADE, _EVEN = 2, 10, 61  # values at which roots are counted; of a bounded domain evenly spaced ones
-_HALVINGS = 14  # of what lies between two values: to 1e-5 of them
-_SHARE = 0.02  # of a range that errors leave open, to which its ends are found: errors are hardly known better
+# Roots are counted at 10 values per decade, two decades to each side; in a bounded domain at 61 evenly spaced values.
+_DECADES, _PER_DECADE, _EVEN = 2, 10, 61
+_HALVINGS = 14  # most halvings of the interval between two values: to about 1e-5 of the values
+_SHARE = 0.02  # precision of the ends of an undecided range, over its width: errors are hardly known better
 _NEWTON = 30  # most steps of Newton's method; from a bracket of 1e-5 a few do
-_STEP = 1e-7  # relative, of differences: the root of rounding
+_STEP = 1e-7  # relative step of differences: about the square root of the rounding error
 _LAST = 1e-12  # relative step at which Newton's method has ended
 
 
@@ -40,7 +41,10 @@ class MeasuredSearch:
 
     @property
     def decided(self) -> tuple[float, float]:
-        """Values around the own one between which all is decided; known after `boundaries`."""
+        """Range about the parameter's value in which stability is decided; known after `boundaries`.
+
+        Known after `boundaries`.
+        """
         ends = [end for gap in self.gaps for end in gap]
         return (
             max((one for one in ends if one <= self.value), default=-np.inf),
@@ -49,7 +53,7 @@ class MeasuredSearch:
 
     @property
     def searched(self) -> tuple[float, float]:
-        """Default range."""
+        """Default range of the search."""
         grid = self._grid(None)
         return float(grid[0]), float(grid[-1])
 
@@ -82,9 +86,10 @@ class MeasuredSearch:
         for i, j in pairwise(sure):
             if status[i] != status[j]:
                 found.append(self._edge(float(grid[i]), float(grid[j]), int(status[i]), int(status[j])))
-            elif j > i + 1:  # two edges, or none
+            elif j > i + 1:  # between two values of equal status are two edges, or none
                 gaps.append((float(grid[i]), float(grid[j])))
-        first, last = (sure[0], sure[-1]) if sure.size else (-1, -1)  # all is one gap where nothing is sure
+        # if the status is sure nowhere, the whole range is a gap
+        first, last = (sure[0], sure[-1]) if sure.size else (-1, -1)
         gaps = [(float(grid[0]), float(grid[first])), *gaps, (float(grid[last]), float(grid[-1]))]
         self.gaps = _joined([gap for gap in gaps if gap[0] < gap[1]])
         return tuple(found)
@@ -108,7 +113,7 @@ class MeasuredSearch:
         return Boundary(self.name, value, bracket, kind, beta, stable, self.role.unit, area)
 
     def _last(self, sure: float, within: float, status: int, halvings: int) -> float:
-        """Value that surely has a status, next to the open ones around `within`: to `_SHARE` of their range."""
+        """Last value on the way from `sure` towards `within` at which the machine surely has the given status."""
         open_ = within
         for _ in range(halvings):
             if abs(open_ - sure) <= _SHARE * abs(within - open_):
@@ -118,7 +123,10 @@ class MeasuredSearch:
         return sure
 
     def _polished(self, low: float, high: float, outer: tuple[float, float]) -> tuple[float, float]:
-        """Value and frequency at which the determinant is zero, by Newton's method from where it is nearest."""
+        """Value and frequency at which the determinant is zero.
+
+        Newton's method starts at the frequency where it is smallest.
+        """
         middle = 0.5 * (low + high)
         value, beta = middle, self._at(middle).count.omega
         if beta <= self.own.response.omega[0]:  # a root that crosses at zero, where nothing is to be followed
@@ -143,7 +151,7 @@ class MeasuredSearch:
 
 
 def _joined(gaps: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """Rising ranges, those as one that follow each other."""
+    """The rising ranges, with ranges joined where one begins at the end of the one before."""
     found: list[tuple[float, float]] = []
     for low, high in gaps:
         if found and found[-1][1] == low:

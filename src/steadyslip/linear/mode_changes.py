@@ -18,7 +18,7 @@ from steadyslip.model.numeric.machine_point import MachinePoint
 
 _STEP = 0.01  # relative step of differences of matrices; exact if the matrices are linear in the parameter
 _STENCIL = np.array([-1, 9, -45, 45, -9, 1]) / 60  # central differences of sixth order: error 1e-12 if smooth
-_PLACES = np.array([-3, -2, -1, 1, 2, 3])  # positions of `_STENCIL`, in steps
+_PLACES = np.array([-3, -2, -1, 1, 2, 3])  # positions at which `_STENCIL` needs values, in steps
 ADDED = ("spring", "damper", "mass")
 SLIDING, TURNING = ("N/m", "N s/m", "kg"), ("N m/rad", "N m s/rad", "kg m^2")
 
@@ -90,7 +90,10 @@ class Perturbation:
                 yield ModeChange(name, float(one.value), one.role.unit, self.by_parameter(name, float(one.value)))
 
     def additions(self) -> Iterator[ModeChange]:
-        """Yield the derivatives by springs, dampers and masses to the ground, and by properties that links lack."""
+        """Yield the derivatives by springs, dampers and masses to the ground.
+
+        Links get a stiffness or a damping if they have none.
+        """
         machine = self.point.machine
         for end in machine.ends():
             turns = end in machine.bodies and machine.bodies[end].turns

@@ -28,13 +28,13 @@ from steadyslip.linear.stiffness import eigenvalues
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
-LOWER, HIGHER = 0.1, 2.0  # default range of the parameter, times its own value
-_SHY = 0.98  # largest share of the way from the own value to an end of the domain, which may be excluded
-POINTS = 33  # first values of the parameter; midpoints are added, and more where eigenvalues cannot be matched
-MOST_POINTS = 8 * POINTS  # bounds the time
+LOWER, HIGHER = 0.1, 2.0  # ends of the default range of the parameter, as multiples of its value in the machine
+_SHY = 0.98  # the default range goes at most this share of the way from the value to an end of the domain
+POINTS = 33  # initial number of values; midpoints are added, and more values where eigenvalues cannot be matched
+MOST_POINTS = 8 * POINTS  # largest number of values; bounds the computing time
 _CLEAR = 0.5  # largest step of an eigenvalue between neighbouring values, over the distance to other eigenvalues
 _SAME = 1e-6  # relative distance up to which two eigenvalues count as one double eigenvalue
-_SPREAD = 30.0  # ratio of the ends of a range from which points are spaced evenly in the logarithm
+_SPREAD = 30.0  # ratio of the ends of a range above which the values are spaced evenly in their logarithm
 
 
 @dataclass(frozen=True, repr=False)
@@ -129,7 +129,7 @@ class ModeChart(Displayed):
 
     @property
     def titles(self) -> tuple[str, ...]:
-        """Names of the columns: ``mode 3``; ``another mode``, ``another mode 2`` for those without number."""
+        """Titles of the columns: ``mode 3``; ``another mode``, ``another mode 2`` for oscillations without number."""
         found, others = [], 0
         for number in self.numbers:
             others += not number
@@ -234,9 +234,9 @@ def _range(rig: Machine, name: str, between: Sequence[Any] | None) -> tuple[floa
 def followed(roots_at: Callable[[Array], ComplexArray], values: Array) -> tuple[Array, ComplexArray]:
     """Oscillations followed along a parameter: values (p,), with some added, and eigenvalues (p, n), NaN if absent.
 
-    Eigenvalues at neighbouring values are matched, and a midpoint checks the match; where it gives another match, or an
-    eigenvalue moves too far, further values are added, up to `MOST_POINTS`. Matches that are still ambiguous then are
-    of eigenvalues that meet, where both are right.
+    Eigenvalues at neighbouring values are matched, and eigenvalues at their midpoint check the match. Where the check
+    fails, or an eigenvalue moves too far, further values are added, up to `MOST_POINTS`. Matches that remain ambiguous
+    are of eigenvalues that meet; either match is right there.
     """
     known = dict(zip(values.tolist(), map(_oscillations, roots_at(values)), strict=True))
     least = (values[-1] - values[0]) / MOST_POINTS**2
@@ -271,7 +271,7 @@ def _oscillations(roots: ComplexArray) -> ComplexArray:
 
 
 def _pairs(before: ComplexArray, after: ComplexArray) -> tuple[Array, Array]:
-    """Indices of matching eigenvalues in two sets: the assignment with the least sum of distances."""
+    """Indices, in two sets of eigenvalues, of those that match: the assignment with the least sum of distances."""
     from scipy.optimize import linear_sum_assignment  # slow to import
 
     rows, columns = linear_sum_assignment(np.abs(before[:, None] - after))
@@ -279,7 +279,10 @@ def _pairs(before: ComplexArray, after: ComplexArray) -> tuple[Array, Array]:
 
 
 def _is_clear(before: ComplexArray, between: ComplexArray, after: ComplexArray) -> bool:
-    """True if the three sets are of one size, moves are small, and matching in two steps or in one agrees."""
+    """True if the three sets are equally large, moves are small, and both ways of matching agree.
+
+    The ways are direct, and through `between`.
+    """
     if not len(before) == len(between) == len(after):
         return False
     first, second, whole = (_becomes(*two) for two in ((before, between), (between, after), (before, after)))
@@ -290,13 +293,13 @@ def _is_clear(before: ComplexArray, between: ComplexArray, after: ComplexArray) 
 
 
 def _becomes(before: ComplexArray, after: ComplexArray) -> Array:
-    """Index in `after` of the match of each eigenvalue in `before`; the sets have one size."""
+    """For each eigenvalue in `before`, the index of its match in `after`, a set of equal size."""
     rows, columns = _pairs(before, after)
     return np.asarray(columns[np.argsort(rows)])
 
 
 def _gaps(roots: ComplexArray) -> Array:
-    """Distance of each root to the nearest other root, copies of a double root excepted."""
+    """Distance of each root to the nearest other root that is not a copy of the same double root."""
     apart = np.abs(roots[:, None] - roots)
     apart[apart <= _SAME * np.abs(roots)] = np.inf
     return np.asarray(np.min(apart, axis=1, initial=np.inf))

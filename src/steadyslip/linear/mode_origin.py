@@ -35,11 +35,11 @@ WORDS = {
 """Sentences on why an oscillation grows, by the kind of `Origin`."""
 BY_VELOCITY, BY_NORMAL = " by velocity", " by normal force"
 CONTROLLER = "drive.controller"
-_STEPS = 16  # steps of friction from none to the machine's own, through which the coupling pair is followed
+_STEPS = 16  # number of steps between no friction and the machine's friction, at which the two modes are followed
 _MOST = 4.0  # largest multiple of the machine's friction up to which a meeting of frequencies is sought
-_ROUNDS, _LAST = 60, 4 * np.finfo(float).eps  # most steps of regula falsi, and relative size of its last step
+_ROUNDS, _LAST = 60, 4 * np.finfo(float).eps  # regula falsi: most steps, and relative size of the last step
 _SAME = 1e-6  # relative difference of frequencies that counts as rounding of a double root
-_ALIKE = 0.5  # share of the largest feed from which another contact is mentioned too
+_ALIKE = 0.5  # other contacts are counted if they feed at least this share of what the largest contact feeds
 _NEAR = 0.25  # largest relative difference of frequency between a mode and the undamped pair identified with it
 
 
@@ -193,14 +193,14 @@ class _ContactResponse:
 
 
 class _Undamped:
-    """The machine without damping, with a share of the friction that follows the normal force."""
+    """The machine without damping, and with a given share of the part of friction that follows the normal force."""
 
     def __init__(self, point: MachinePoint, s: complex) -> None:
         self.target, self.matrices = s, point.matrices
         self.answers = [_ContactResponse(point, i, 1j * abs(s.imag)) for i in range(len(point.matrices.sites))]
 
     def squares(self, share: float) -> ComplexArray:
-        """Values of λ² at a share of the friction."""
+        """Values of λ² if friction that follows the normal force is multiplied by `share`."""
         from scipy.linalg import eig  # slow to import
 
         mass, stiffness = self.matrices.mass.copy(), self.matrices.stiffness.copy()
@@ -230,7 +230,12 @@ class _Undamped:
         return complex(0.5 * (real[at] + real[at + 1])), float(0.25 * (real[at + 1] - real[at]) ** 2)
 
     def meeting(self) -> tuple[float, int, float] | None:
-        """Share of the friction at which the pair meets, number of its first mode, frequency (rad/s); None if none."""
+        """Share of friction at which two modes meet, number of the lower mode, and frequency (rad/s).
+
+        None if no modes meet.
+
+        None if no modes meet.
+        """
         goal = complex(-(abs(self.target.imag) ** 2))
         middle, apart = self._pair(1.0, goal)
         steps = np.linspace(1.0, 0.0, _STEPS + 1)[1:] if apart < 0 else np.linspace(1.0, _MOST, 3 * _STEPS + 1)[1:]

@@ -31,13 +31,13 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import explain_absence, steady_machine
 
 ENDINGS = (".csv", ".html", *FIGURES)
-MOST = 8  # number of modes printed (rightmost first), and of parameters (largest effect first)
+MOST = 8  # largest number of modes printed (rightmost first), and of parameters printed (largest effect first)
 LEAST = 1e-3  # contributions to the growth rate below this share of the largest are not printed
 
 
 @dataclass(frozen=True, repr=False)
 class Modes(Displayed):
-    """All modes of a machine, the one that grows fastest, or decays slowest, first; a sequence of `Mode`.
+    """All modes of a machine as a sequence of `Mode`; first the mode that grows fastest or decays slowest.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class Modes(Displayed):
         return "\n".join([*lines, *self._ranking(), *self._additions()])
 
     def _ranking(self) -> list[str]:
-        """Lines on the parameters that change the growth rate of the chosen mode most."""
+        """Lines that name the parameters which change the growth rate of the chosen mode most."""
         known = [one for one in self.changes if not one.added][:MOST]
         width = max((len(one.name) for one in known), default=0)
         rows = [
@@ -138,7 +138,7 @@ class Modes(Displayed):
         return ["", f"growth rate of {self._title}, to first order, for 1 % more of", *rows] if rows else []
 
     def _additions(self) -> list[str]:
-        """Lines on what springs, dampers and masses would do to the growth rate of the chosen mode."""
+        """Lines that say how added springs, dampers and masses would change the growth rate of the chosen mode."""
         rows: dict[str, list[str]] = {}
         for one in self.changes:
             if one.added:
@@ -166,7 +166,8 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
     Returns
     -------
     Modes
-        A sequence of `Mode`, the one that grows fastest, or decays slowest, first; of a pair the one with β > 0.
+        A sequence of `Mode`, first the mode that grows fastest or decays slowest. A pair of eigenvalues is one mode, β
+        > 0.
 
     Raises
     ------
@@ -221,14 +222,17 @@ def with_modes(rig: Slider | Machine) -> Machine:
 def growth_origin(rig: Machine, s: complex, number: int) -> Origin | None:
     """Reason why the mode with the eigenvalue `s` (1/s) and a `Mode.number` grows.
 
-    None if it does not oscillate or grow, with a delay, and if no numeric steady state is found.
+    None if the mode does not oscillate or grow, if the machine has a delay, or if no steady state is found numerically.
     """
     point = _numeric_point(rig) if number and s.real > ON_THE_EDGE * abs(s) else None
     return None if point is None else origin_of(point, s, number)
 
 
 def _numeric_point(rig: Machine) -> MachinePoint | None:
-    """Numeric steady sliding; None with a delay, and if Newton's method does not converge (very stiff links)."""
+    """Operating point found numerically.
+
+    None with a delay, or if Newton's method does not converge (very stiff links).
+    """
     point = machine_point(rig) if in_numbers(rig) else None
     return point if point is not None and not point.balance.problem and point.balance.exists else None
 

@@ -35,7 +35,7 @@ WORDS = {
 """Phrases for `Mode.words`, singular|plural; pages use the same keys."""
 MOVES, HARDLY = 0.5, 0.1  # share of the largest amplitude from which a body oscillates; below which it hardly moves
 UNSEEN = 1e-9  # share of a structure's largest amplitude below which the motion of points is rounding error
-MANY, NAMED = 8, 3  # with more coordinates than MANY a sentence names only the NAMED ones that move most
+MANY, NAMED = 8, 3  # if a machine has more coordinates than MANY, a sentence names the NAMED that move most
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Mode(Displayed):
         }
 
     def words(self) -> str:
-        """The shape of the mode as a sentence."""
+        """Sentence that describes which bodies move, how, and where the energy is."""
         sizes = {name: abs(one) for name, one in self.amplitudes.items()}
         leads = [name for name, size in sizes.items() if size >= MOVES]
         rest = [name for name, size in sizes.items() if HARDLY <= size < MOVES]
@@ -131,7 +131,12 @@ class Mode(Displayed):
         return text
 
     def _way(self, body: str, names: list[str]) -> str:
-        """Directions among `names` in which a body moves; empty for one that moves along its surface only."""
+        """Directions in which a body moves, by the coordinates in `names`.
+
+        Empty for a body that can only move along its surface.
+
+        Empty for a body that can only move along its surface.
+        """
         if body + NORMAL not in self.amplitudes:
             return ""
         away = body + NORMAL in names
@@ -142,7 +147,7 @@ class Mode(Displayed):
         return body + WORDS["way"].format(way=way) if way else body
 
     def _direction(self, body: str, leads: list[str], still: list[str]) -> str:
-        """Clause on the directions in which the only oscillating body moves, and in which it hardly moves."""
+        """Clause that says in which directions the only oscillating body moves, and in which it hardly moves."""
         way = self._way(body, leads)
         hardly = WORDS["hardly_along"] if body in still else WORDS["hardly_away"] if body + NORMAL in still else ""
         return f" {way}{hardly}" if way else ""
@@ -163,7 +168,7 @@ class Mode(Displayed):
 
 
 def _does(what: str, names: list[str]) -> str:
-    """Verb of a phrase, in the singular for one name and in the plural for several."""
+    """Verb of the phrase `what`: in the singular for one name, in the plural for several."""
     return WORDS[what].split("|")[len(names) > 1]
 
 
@@ -173,7 +178,7 @@ def _listed(names: list[str]) -> str:
 
 
 def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
-    """Mode of a machine that belongs to the eigenvalue `s` (1/s)."""
+    """Mode of a machine for the eigenvalue `s` (1/s)."""
     model = point.model
     size = len(characteristic_rows(model))
     powers, function = matrix_function(model)
@@ -199,7 +204,7 @@ def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
 
 
 def _number(s: complex, eigenvalues: ComplexArray) -> int:
-    """Place of an oscillation among all by rising frequency, from 1; 0 of an eigenvalue that does not oscillate."""
+    """Place of an oscillation by rising frequency among all, from 1; 0 if the eigenvalue `s` does not oscillate."""
     return int(np.sum((eigenvalues.imag > 0) & (eigenvalues.imag <= abs(s.imag))))
 
 
@@ -220,7 +225,7 @@ def _null_vector(matrix: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 
 def matrix_mode(point: MachinePoint, s: complex) -> Mode:
-    """Mode, at bodies and named points, of a machine given by matrices that belongs to the eigenvalue `s` (1/s)."""
+    """Mode of a machine given by matrices for the eigenvalue `s` (1/s), with amplitudes of bodies and named points."""
     machine, names = point.machine, point.matrices.names
     shape = point.pencil.mode(s)[: len(names)]
     places = dict(zip(names, shape, strict=True))
@@ -241,7 +246,7 @@ def matrix_mode(point: MachinePoint, s: complex) -> Mode:
 
 @dataclass(frozen=True)
 class EnergyStore:
-    """Energy of a body, link or contact: `weight` |amplitude along `row`|², times |s|² if it is `kinetic`."""
+    """Energy of a body, link or contact: `weight` · |amplitude along `row`|², times |s|² if the energy is kinetic."""
 
     name: str
     kinetic: bool
@@ -261,7 +266,8 @@ def stores(mechanism: Mechanism) -> list[EnergyStore]:
     for element in mechanism.elements:
         row = {n: c for n, c in element.senses.items() if n in names}
         beside = not element.delay and row == dict(element.acts)
-        if element.stiffness and (element.name or beside):  # a controller that senses where it acts is a spring, too
+        # a controller that acts where it senses stores energy like a spring
+        if element.stiffness and (element.name or beside):
             found.append(EnergyStore(element.name or "drive.controller", False, element.stiffness, row))
     for touch in mechanism.contacts:
         if touch.separation and touch.contact.is_compliant():

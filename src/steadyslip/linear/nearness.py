@@ -47,10 +47,10 @@ def doublings(value: ArrayLike, other: ArrayLike, unit: str = "") -> Any:
 
 
 def nearest_end(ends: Array, own: ArrayLike, unit: str = "") -> Array:
-    """Index (...) of the end nearest to each own value by `doublings`.
+    """Index (...) of the end nearest to each value `own`, by `doublings`.
 
-    Only the neighbours of the own value on either side are compared, as larger changes pass these first; of two equally
-    far ends the one with the smaller difference.
+    Only the next end below `own` and the next above are compared, as larger changes pass these first. Of two ends
+    equally far in doublings, the end with the smaller difference is taken.
 
     Parameters
     ----------
@@ -73,9 +73,9 @@ def nearest_end(ends: Array, own: ArrayLike, unit: str = "") -> Array:
 
 
 def ends_about(own: float, ends: Sequence[float], unit: str = "") -> tuple[float, ...]:
-    """Ends next to an own value, below and above it, nearest first: two, one or none.
+    """The next end below the value `own` and the next above, nearer one first: two, one or none.
 
-    An end equal to the own value is returned alone.
+    If an end is equal to `own`, only that end is returned.
     """
     beside = [*sorted(end for end in ends if end < own)[-1:], *sorted(end for end in ends if end >= own)[:1]]
     beside.sort(key=lambda end: (doublings(own, end, unit), abs(end - own)))

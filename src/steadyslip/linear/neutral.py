@@ -22,7 +22,7 @@ Sets = NDArray[np.bool_]
 """Table (m, d): True where term j is delayed by delay i."""
 _SWEEPS = 30  # rounds over all delays; by trial: the smallest value found changes by less than 1e-6 in the last
 _STARTS = 24  # random starts of the minimisation of |P|, beside all combinations of phases 0 and π, where P is real
-_SETTLED = 1e-9  # relative change in a round below which the minimum has converged
+_SETTLED = 1e-9  # relative change of the minimum in one round below which it has converged
 _SURE = 0.5  # share of the smallest value found that is used as lower bound: another start might find a smaller one
 _STEPS = 257  # points between 0 and x at which the argument of P is followed
 
@@ -35,7 +35,7 @@ def highest(c: Array) -> tuple[Array, NDArray[np.int64]]:
 
 
 def leads(c: Array) -> NDArray[np.bool_]:
-    """True (rows,) where at the highest power the term without delay is larger than all others together.
+    """True (rows,) where, at the highest power of s, the term without delay exceeds all other terms together.
 
     For coefficients c (rows, m, n+1).
     """
@@ -57,7 +57,8 @@ def least_size(c: Array, sets: Sets) -> Array:
     rows = np.flatnonzero((found <= 0) & several & (c[:, 0] != 0))
     if rows.size:
         size = np.abs(c[rows, 0])
-        shapes, same = np.unique(c[rows] / size[:, None], axis=0, return_inverse=True)  # a scan repeats few
+        # many rigs of a scan have the same coefficients
+        shapes, same = np.unique(c[rows] / size[:, None], axis=0, return_inverse=True)
         found[rows] = _SURE * size * _smallest(shapes, sets)[same.ravel()]
     return found
 
@@ -92,7 +93,7 @@ def _signs(count: int) -> Array:
 
 
 def corners(sets: Sets) -> Array:
-    """Products of x_i in each term for all combinations of x_i = 1 or −1, (m, 2^d).
+    """Products of the x_i in each term, for all combinations of x_i = ±1, (m, 2^d).
 
     If dampings are reciprocal, P first vanishes at one of these combinations as delayed terms grow.
     """

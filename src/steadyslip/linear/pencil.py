@@ -34,11 +34,11 @@ _NOISE = np.finfo(float).eps
 _LAST = 8 * _NOISE  # relative rounding error after a few operations on the machine's parameters
 _BESIDE = 1 + 64 * _NOISE  # factor on an eigenvalue: dM/ds is taken slightly beside it, for double eigenvalues
 _FIRST = 2.0  # safety factor on errors to first order, for the effect of nearby eigenvalues
-_TRIALS = 4  # copies with perturbed last digits of parameters, which exp(−(v/v_s)²), for example, amplifies
-_ALIKE = 100.0  # ratio to the least singular value up to which other singular values count as vanishing too
-_SWEEPS = 3  # alternate scalings of rows and columns to equal size
+_TRIALS = 4  # number of copies with perturbed last digits of parameters; exp(−(v/v_s)²), for example, amplifies these
+_ALIKE = 100.0  # singular values up to this multiple of the least one count as zero too
+_SWEEPS = 3  # number of times that rows, then columns, are scaled to equal size
 _APART = 0.3  # largest error (rad) of the determinant's argument at a frequency; a lost eigenvalue makes more than 1
-_PLACES = 3  # frequencies on the axis for each eigenvalue
+_PLACES = 3  # number of frequencies, for each eigenvalue, at which the determinant is evaluated
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,10 @@ def checked_spectrum(point: OperatingPoint) -> CheckedSpectrum:
 
 
 def _by_newton(point: OperatingPoint, first: CheckedSpectrum) -> tuple[ComplexArray, Array]:
-    """Eigenvalues under delays and their errors (1/s); those with too large an error are computed with many digits."""
+    """Eigenvalues under delays with their errors (1/s). Those with too large errors are computed with many digits.
+
+    Eigenvalues with too large errors are computed with many digits.
+    """
     values, errors = first.values.copy(), first.errors.copy()
     last = 1 + _LAST * np.random.default_rng(0).choice([-0.5, 0.5], (_TRIALS, len(point.arguments)))
     others = [point.with_arguments([a * own for a, own in zip(point.arguments, row, strict=True)]) for row in last]
@@ -160,7 +163,7 @@ def _count(point: OperatingPoint) -> int:
 
 
 def _coefficient_errors(point: OperatingPoint, s: ComplexArray) -> Array:
-    """Change of eigenvalues `s` (1/s) by the last digits of polynomial coefficients; 0 if there is no polynomial."""
+    """Change of eigenvalues `s` (1/s) by rounding of the polynomial's coefficients; 0 if there is no polynomial."""
     if not is_written_out(point.model):
         return np.zeros(len(s))
     c, moved = characteristic(point), characteristic(_retold(point))
@@ -174,7 +177,7 @@ def _coefficient_errors(point: OperatingPoint, s: ComplexArray) -> Array:
 
 
 def _retold(point: OperatingPoint) -> OperatingPoint:
-    """Copies of a single rig, (`_TRIALS`,), with perturbed last digits."""
+    """Copies of a single rig, (`_TRIALS`,), with the last digits of all parameters perturbed."""
     chance = np.random.default_rng(0)
     last = 1 + _LAST * chance.choice([-0.5, 0.5], (len(point.arguments), _TRIALS))
     return point.with_arguments([a * own for a, own in zip(point.arguments, last, strict=True)], (_TRIALS,))
@@ -209,9 +212,9 @@ class _Matrix:
         return bool(np.all(np.isfinite(self.entries)))
 
     def even(self, s: ComplexArray) -> tuple[ComplexArray, Array, ComplexArray]:
-        """M at s (p,), errors of its entries, and dM/ds, (p, n, n) each; rows and columns scaled to equal size."""
+        """M at s (p,), errors of its entries, and dM/ds, each (p, n, n). Rows and columns are scaled to equal size."""
         place, top = s[:, None], np.max(self.powers)
-        size = np.maximum(np.abs(place), 1.0)  # divide by its highest power, which may leave floating point
+        size = np.maximum(np.abs(place), 1.0)  # entries are divided by size^top, which may leave floating point
         unit, late = place / size, np.exp(-place * self.late)
         factor = unit**self.powers * size ** (self.powers - top) * late
         lower = np.maximum(self.powers - 1, 0)
@@ -227,7 +230,7 @@ class _Matrix:
         return whole, np.einsum("ijk,pk->pij", self.wrong, np.abs(factor)) * units, slope
 
     def errors(self, s: ComplexArray) -> Array:
-        """Distance (1/s) of each `s` from an eigenvalue of the matrix; inf where it cannot be computed."""
+        """Distance (1/s) of each `s` from the nearest eigenvalue of the matrix; inf where it cannot be computed."""
         with np.errstate(all="ignore"):
             whole, wrong, slope = self.even(s * _BESIDE)
             good = np.all(np.isfinite(whole) & np.isfinite(wrong) & np.isfinite(slope), axis=(1, 2))
@@ -263,15 +266,15 @@ def _distance(whole: ComplexArray, wrong: Array, slope: ComplexArray) -> float:
     left, singular, right = np.linalg.svd(whole)
     u, v = np.abs(left[:, -1]), np.abs(right[-1])
     least = float(singular[-1] + u @ wrong @ v)
-    alike = int(np.sum(singular <= _ALIKE * least))  # a space of as many dimensions goes to zero
+    alike = int(np.sum(singular <= _ALIKE * least))  # number of singular values that vanish
     steep = np.linalg.svd(left[:, -alike:].conj().T @ slope @ right[-alike:].conj().T, compute_uv=False)
     return _FIRST * least / float(steep[-1]) if steep[-1] > 0 else np.inf
 
 
 def _spread(s: ComplexArray, errors: Array) -> Array:
-    """Errors (1/s) of eigenvalues with near neighbours: m that coincide move with the m-th root of a perturbation.
+    """Errors (1/s) of eigenvalues with near neighbours. If m coincide, they move with the m-th root of a perturbation.
 
-    `errors` are those of each alone, which are the larger the closer the others are.
+    `errors` are those of each eigenvalue taken alone; they are the larger, the closer other eigenvalues are.
     """
     size = np.maximum(np.abs(s), np.finfo(float).tiny)
     best = np.array(errors)
@@ -285,6 +288,6 @@ def _spread(s: ComplexArray, errors: Array) -> Array:
 
 @cached
 def matrix_function(model: Model) -> tuple[list[tuple[int, ...]], ArrayFunction]:
-    """Powers of s and exp(−s delay) in the characteristic matrix, and array function of every entry's coefficients."""
+    """Powers of s and exp(−s delay) in the characteristic matrix, and an array function of its coefficients."""
     powers, entries = matrix_entries(model)
     return powers, model.function(entries)

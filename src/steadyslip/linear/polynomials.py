@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from steadyslip.linear import crossing
 from steadyslip.linear.roots import Array, ComplexArray, degrees, quietly, roots
 
-_NEARLY_REAL = 1e-6  # relative imaginary part below which a root in β² is tried as a boundary
-_FAR = 1e75  # size beyond which products of four coefficients may leave the range of floating point
+_NEARLY_REAL = 1e-6  # relative imaginary part up to which a root in β² counts as real
+_FAR = 1e75  # size of a coefficient beyond which products of four may leave the range of floating point
 _SAME = 1e-9  # relative distance below which two boundaries in k are one
 
 
@@ -64,7 +64,8 @@ def is_hurwitz(c: Array, spare: ArrayLike) -> NDArray[np.bool_]:
 
 
 def _in_own_time(c: Array) -> Array:
-    """Polynomials with time rescaled so that lowest and highest coefficients are alike, if coefficients lie far apart.
+    """Polynomials with time rescaled so that the lowest and highest coefficient are alike, where coefficients lie far
+    apart.
 
     Without rescaling, the Routh array would lose the smallest coefficients.
     """
@@ -103,7 +104,7 @@ def most_intervals(degree: int) -> int:
 
 @dataclass(frozen=True)
 class StableSet:
-    """Stable intervals of k in p + k q and their edges, for arrays of rigs.
+    """Values of k at which p + k q is stable, as intervals with their edges, for arrays of rigs.
 
     Attributes
     ----------
@@ -163,7 +164,7 @@ def stable_set(p: Array, q: Array, spare: ArrayLike) -> StableSet:
 
 
 def _near_one(c: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Polynomials, divided by a power of two if all coefficients are tiny or huge; its exponents, (..., 1)."""
+    """Polynomials divided by a power of two where all coefficients are tiny or huge, and the exponents (..., 1)."""
     sizes = np.abs(c)
     largest = np.max(sizes, axis=-1, keepdims=True)
     least = np.min(np.where(sizes > 0, sizes, np.inf), axis=-1, keepdims=True)
@@ -173,7 +174,7 @@ def _near_one(c: Array) -> tuple[Array, NDArray[np.intp]]:
 
 
 def _candidates(p: Array, q: Array) -> tuple[Array, Array]:
-    """Positive k at which a root may cross the imaginary axis, and its β; padded with NaN."""
+    """Positive k at which a root may cross the imaginary axis, and its frequency β; padded with NaN."""
     with np.errstate(all="ignore"):
         static, top = crossing.real_edges(columns(p), columns(q))
     w = crossing_squares(p, q)
@@ -188,7 +189,7 @@ def _candidates(p: Array, q: Array) -> tuple[Array, Array]:
 
 
 def columns(c: Array) -> list[Array]:
-    """List of coefficients (...), lowest power first, as functions of `crossing` take them."""
+    """List of the coefficients, lowest power first, each an array (...), as the functions of `crossing` take them."""
     return [c[..., i] for i in range(c.shape[-1])]
 
 
@@ -227,7 +228,7 @@ def crossing_squares(p: Array, q: Array) -> Array:
 
 
 def _between(k: Array, p: Array, q: Array) -> Array:
-    """One k inside each interval of (0, inf) cut at the candidates."""
+    """One k inside each of the intervals into which the candidates `k` cut (0, inf)."""
     with np.errstate(all="ignore"):
         ratio = np.abs(p / q)
         natural = np.nanmax(np.where(np.isfinite(ratio) & (ratio > 0), ratio, np.nan), axis=-1, initial=0.0)
@@ -240,7 +241,7 @@ def _between(k: Array, p: Array, q: Array) -> Array:
 
 
 def _intervals(k: Array, stable: NDArray[np.bool_]) -> Array:
-    """Join neighbouring stable cells into intervals, NaN padded."""
+    """Intervals of k, made of neighbouring stable cells; padded with NaN."""
     rows = len(stable)
     low = np.concatenate([np.zeros((rows, 1)), k], axis=-1)
     high = np.concatenate([k, np.full((rows, 1), np.inf)], axis=-1)

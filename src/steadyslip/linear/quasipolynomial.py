@@ -27,8 +27,9 @@ from steadyslip.linear.polynomials import even_odd, product
 from steadyslip.linear.roots import Array, evaluate, quietly, roots
 
 INFINITE = 2**62  # a count of roots, larger than any other
-_BATCH = 40  # rigs with several delays counted at a time; chosen by trial: memory against speed
-_MOST_PERIODS = 5000  # crossing delays are listed up to this many periods of the fastest crossing; by trial
+_BATCH = 40  # number of rigs with several delays whose roots are counted together; by trial: memory against speed
+# delays at which roots cross are listed up to this many periods of the highest frequency; by trial
+_MOST_PERIODS = 5000
 
 
 def value(c: Array, h: Array, s: Any) -> Any:
@@ -49,7 +50,7 @@ def size_of_terms(c: Array, h: Array, s: Any) -> Any:
 
 
 def _terms(c: Array, h: Array) -> Iterator[tuple[Array, Array]]:
-    """Yield the coefficients and the delay of each term; for several rigs shaped to broadcast with values (rigs, k)."""
+    """Yield the coefficients and the delay of each term. For several rigs they broadcast with values (rigs, k)."""
     for j in range(c.shape[-2]):
         yield (c[j], h[j]) if c.ndim == 2 else (c[:, j, None], h[:, j, None])
 
@@ -69,7 +70,7 @@ def shifted(c: Array, h: Array, shift: Array) -> Array:
 
 @quietly
 def nondimensional(c: Array, h: Array) -> tuple[Array, Array, Array]:
-    """Coefficients, delays and rate (1/s) of quasi-polynomials made dimensionless: s = rate times the new s.
+    """Dimensionless coefficients and delays of quasi-polynomials, and the rate (1/s) that is the unit of s.
 
     The rate makes lowest and highest coefficients equal in size; then the largest coefficient is made one.
     """
@@ -159,7 +160,7 @@ def crossings(p: Array, q: Array) -> tuple[Array, Array, Array]:
 
 
 def _count_by_crossings(p: Array, q: Array, h: Array) -> NDArray[np.int64]:
-    """Number of roots of p + q exp(−sh) right of the axis: number at h = 0 plus crossings as h grows."""
+    """Number of roots of p + q exp(−sh) right of the axis: the number at h = 0, plus crossings as h grows."""
     start = np.sum(roots(p + q).real > 0, axis=-1)
     omega, direction, phase = crossings(p, q)
     times = np.maximum(np.ceil((omega * h[:, None] - phase) / (2 * np.pi)), 0.0)
@@ -214,7 +215,7 @@ def crossing_delays(p: Array, q: Array) -> tuple[Array, Array, Array]:
 
 
 def list_crossing_delays(omega: Array, direction: Array, phase: Array) -> tuple[Array, Array, Array]:
-    """Delays (φ + 2πk)/ω, k = 0, 1, ..., of crossings with falling ω; rising, with ω and direction of each.
+    """Delays (φ + 2πk)/ω, k = 0, 1, ..., in rising order, with the ω and direction of each; `omega` is falling.
 
     The list ends where the rig is unstable at all longer delays, or after `_MOST_PERIODS` periods.
     """

@@ -29,21 +29,21 @@ from steadyslip.linear.quasipolynomial import (
 from steadyslip.linear.roots import Array, ComplexArray, companion_eigenvalues, quietly, roots
 
 _ORDER = 6  # order of the Padé approximants for starting values: exp(−iωh) to 1e-3 up to ωh = 7.5
-_MOST_POWERS = 60  # degree of the polynomial with Padé approximants above which bisection is faster; by trial
-_CHUNK = 500  # rigs at a time: some 20 MB of distances between their roots
+_MOST_POWERS = 60  # largest degree of the polynomial with Padé approximants; above it bisection is faster (by trial)
+_CHUNK = 500  # number of rigs treated together: distances between their roots then take some 20 MB
 _NEWTON = 12  # steps of Newton's method from starting values; four or five are enough near a root
 _REAL = 1e-12  # relative imaginary part of a root below which it is rounding error
 _MET = 1e-9  # tolerance of a root: relative size of the last step, and value relative to its terms
 _APART = 1e-6  # relative distance above which two roots found are distinct
-_FARTHEST = 700.0  # logarithm of the largest number, beyond which delayed terms leave floating point
+_FARTHEST = 700.0  # largest exponent of a delayed term: exp(709) leaves the range of floating point
 _HALVINGS = 60  # largest number of bisections of a real part: more than the 53 bits of a double
-_LOST = 1e10  # periods within one delay beyond which rounding leaves fewer than six digits of the phase
+_LOST = 1e10  # limit on frequency times delay (rad): beyond it the phase has fewer than six correct digits
 _CLOSE = (1e-4, 1e-3, 1e-2, 0.1)  # relative distances from `_line_of_many` up to which roots are sought
-_QUICK = 1e5  # largest total phase (rad) of all delay terms up to the highest frequency that takes less than a second
+_QUICK = 1e5  # total phase (rad) of all delay terms up to the highest frequency, for which a count takes under a second
 _RATE_TOLERANCE = 1e-3  # relative error up to which `_line_of_many` is returned as the rate of slowest decay
 _SAME_ROOT = 1e-9  # relative distance below which two results of Newton's method are one root
 _ON_THE_LINE = 1e-3  # relative distance of a root's real part from a line, up to which the root is on the line
-_BISECTED = 1e-7  # distance as `_ON_THE_LINE` if the line is the axis, in units of `nondimensional`: a double root
+_BISECTED = 1e-7  # like `_ON_THE_LINE` for the axis, in dimensionless units: rounding moves a double root by as much
 _BESIDE_CROSSING = np.array([0.0, -0.375, -0.25, -0.125, 0.125, 0.25, 0.375, 0.5])  # turns, for Newton's method
 
 
@@ -71,7 +71,7 @@ def rightmost(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
 
 
 def _by_ratios(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
-    """First `count` roots, (rows, count), if a count of roots shows that none is missing; else NaN.
+    """First `count` roots, (rows, count); NaN where a count of all roots shows that some are missing.
 
     For rigs whose highest power is not delayed; coefficients (rows, m, n+1).
     """
@@ -83,7 +83,8 @@ def _by_ratios(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
     c, h = c[rows], h[rows]
     s = _distinct(*_refined(c, h, _starting_values(c, h, sets)))
     total = np.cumsum(np.where(np.isnan(s), 0, np.where(s.imag > 0, 2, 1)), axis=-1)
-    last = np.argmax(total >= count, axis=-1)[:, None]  # index of the last required root with s.imag >= 0
+    # index of the last root that is needed, among those with s.imag >= 0
+    last = np.argmax(total >= count, axis=-1)[:, None]
     asked, beyond = (np.take_along_axis(s, one, axis=-1)[:, 0] for one in (last, np.minimum(last + 1, s.shape[-1] - 1)))
     gap = np.where(beyond.real < asked.real, asked.real - beyond.real, np.abs(asked))
     line = asked.real - 0.5 * np.minimum(gap, np.abs(asked))
@@ -124,7 +125,7 @@ def _refined(c: Array, h: Array, s: ComplexArray) -> tuple[ComplexArray, NDArray
 
 
 def _distinct(s: ComplexArray, met: NDArray[np.bool_]) -> ComplexArray:
-    """Converged roots without duplicates, by falling real part; NaN padded."""
+    """Converged roots without duplicates, by falling real part; padded with NaN."""
     s = np.where(met, s, np.nan + 0j)
     s = np.take_along_axis(s, np.argsort(-s.real, axis=-1, kind="stable"), axis=-1)
     same = np.abs(s[:, :, None] - s[:, None, :]) <= _APART * np.abs(s)[:, :, None]
@@ -143,7 +144,7 @@ def _rightmost_of_one(c: Array, h: Array, sets: Sets, count: int) -> ComplexArra
     _, left, many = _left_end(c, h, sets)
     numbers = np.arange(1, min(count, many) + 1)
     high = np.full(len(numbers), 1.01 * bound_on_axis(c[None], sets)[0])
-    low = -np.ones(len(numbers)) / (1.0 + float(np.max(h)))  # far to the left delayed terms leave floating point
+    low = -np.ones(len(numbers)) / (1.0 + float(np.max(h)))  # further left, delayed terms leave floating point
     low = np.maximum(low, left)
     for _ in range(60):
         right = count_right_if_feasible(c, h, sets, low)
@@ -176,7 +177,8 @@ def _rightmost_of_one(c: Array, h: Array, sets: Sets, count: int) -> ComplexArra
 
 
 def _left_end(c: Array, h: Array, sets: Sets) -> tuple[float, float, int]:
-    """`_line_of_many` of one rig, a real part right of it up to which roots are sought, and the number of these roots.
+    """Result of `_line_of_many`, a real part right of it up to which roots are sought, and the number of roots further
+    right.
 
     (−inf, −inf, `INFINITE`) if no highest derivative is delayed.
     """
@@ -238,9 +240,9 @@ def nearest_to_axis(c: Array, h: Array, sets: Sets) -> complex:
 
 
 def _root_on(c: Array, h: Array, sets: Sets, real: float, known: Sequence[complex] = ()) -> complex:
-    """Root nearest to the line Re s = `real`, with imaginary part zero or positive, by Newton's method.
+    """Root nearest to the line Re s = `real`, by Newton's method; its imaginary part is zero or positive.
 
-    A root that is not `known` is preferred, as many may lie on one line.
+    Roots that are not in `known` are preferred, as many roots may lie on one line.
     """
     moved = shifted(c, h, np.asarray(real))
     starts = real + 1j * np.array([0.0, *_near_axis(moved, h, sets)])
@@ -260,10 +262,10 @@ def _root_on(c: Array, h: Array, sets: Sets, real: float, known: Sequence[comple
 
 
 def _near_axis(c: Array, h: Array, sets: Sets) -> Iterator[float]:
-    """Frequencies near which a root may lie on the imaginary axis, starting values for Newton's method."""
+    """Frequencies near which a root may lie on the imaginary axis; they are starting values for Newton's method."""
     common = roots(c[:1])[0]  # roots of motions without delay are common zeros of all terms
     yield from np.abs(common.imag[np.isfinite(common)]).tolist()
-    if len(c) == 2:  # sizes of both terms agree there; the next root is within half a turn
+    if len(c) == 2:  # both terms have equal size at these frequencies, and a root is within half a turn of the phase
         found = np.array([one for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one)])
         turn = 2 * np.pi / float(np.max(h)) if np.max(h) > 0 else 0.0
         yield from np.abs(found[:, None] + turn * _BESIDE_CROSSING).ravel().tolist()

@@ -18,9 +18,10 @@ ComplexArray = NDArray[np.complex128]
 
 P = ParamSpec("P")
 R = TypeVar("R")
-_UNMET = 1e-9  # residual at a root relative to its terms, above which the root is computed by groups of size
+# value at a root over the sum of its terms, above which roots are computed again in groups of similar size
+_UNMET = 1e-9
 _APART = 1e4  # ratio of sizes above which roots are in different groups, each solved in its own time unit
-_GONE = 1e-12  # relative size of a coefficient, in a group's time unit, below which it hardly affects the group
+_GONE = 1e-12  # relative size below which a coefficient, in the time unit of a group of roots, hardly affects the group
 _CLOSE = 1e-3  # relative distance of two roots below which they are computed as a quadratic factor
 _ROUNDING = 16 * np.finfo(float).eps  # discriminant over (half sum)² below which it is rounding error of zero
 
@@ -89,7 +90,7 @@ def _roots_of_degree(c: Array) -> ComplexArray:
 
 
 def companion_eigenvalues(c: Array) -> ComplexArray:
-    """Eigenvalues (rows, n) of the companion matrices; those far below the largest are rounding error."""
+    """Eigenvalues (rows, n) of the companion matrices; eigenvalues far below the largest are rounding error."""
     d = c.shape[-1] - 1
     companion = np.zeros((len(c), d, d))
     companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
@@ -102,7 +103,7 @@ def companion_eigenvalues(c: Array) -> ComplexArray:
 
 
 def _polished(c: Array, found: ComplexArray) -> ComplexArray:
-    """Roots (rows, m) improved by Newton's method; close pairs by a common quadratic factor."""
+    """Roots (rows, m) improved by Newton's method; two close roots are improved as one quadratic factor."""
     d = c.shape[-1] - 1
     slope = c[:, None, 1:] * np.arange(1, d + 1)
     value = evaluate(c[:, None, :], found)
@@ -123,7 +124,7 @@ def _polished(c: Array, found: ComplexArray) -> ComplexArray:
 
 
 def _are_missed(c: Array, s: ComplexArray) -> NDArray[np.bool_]:
-    """True for polynomials (rows,) of full degree some of whose computed roots (rows, n) are wrong or missing.
+    """True (rows,) for polynomials of full degree if some of their computed roots `s` (rows, n) are wrong or missing.
 
     At each root the polynomial must vanish relative to its terms, and the product of all roots must be c0/cn in size.
     """
@@ -162,14 +163,14 @@ def _roots_by_size(c: Array) -> ComplexArray:
 
 
 def _groups_of_size(mantissa: Array, exponent: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
-    """Yield groups of roots of similar size, largest first: first index, end index, and nearest power of two (log2).
+    """Yield groups of roots of similar size, largest first: first index, end index, and log2 of their typical size.
 
     The upper hull of the logarithms of a polynomial's coefficients gives the sizes (Newton's polygon).
     """
     n, low = len(mantissa) - 1, int(np.argmax(mantissa != 0))
     height = np.where(mantissa != 0, np.log2(np.abs(mantissa)) + exponent, -np.inf)
     corners = [n]
-    while corners[-1] > low:  # the least slope first: from the largest roots to the smallest
+    while corners[-1] > low:  # by rising slope, that is, from the largest roots to the smallest
         at = corners[-1]
         steps = np.arange(low, at)
         corners.append(int(steps[np.argmax((height[steps] - height[at]) / (at - steps))]))

@@ -1,7 +1,7 @@
-"""Sample values of a parameter for the scan for edges.
+"""Values of a parameter at which a scan for edges of stability evaluates the status.
 
-Samples follow from the parameter's domain, value and natural size. A requested range only adds samples beyond the
-default range, so that the edges found do not depend on the request.
+Samples follow from the parameter's domain, its value, and its typical size by dimensional analysis. A requested range
+only adds samples beyond the default range, so that the edges found do not depend on the request.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from steadyslip.core.domains import Domain
 Array = NDArray[np.float64]
 
 DECADES = 6
-"""Decades to each side of a value, and of the natural size, that are searched by default."""
+"""Number of decades to each side of a parameter's value, and of its typical size, that are searched by default."""
 # Densities of samples, chosen by trial: computing time against narrow windows that fall between two samples.
 _PER_DECADE = 40
 _FURTHER = 10  # samples per decade beyond `DECADES`
@@ -62,9 +62,9 @@ def unbounded(domain: Domain, zero: bool, size: float, least: float, most: float
 
 
 def towards(edge: float, other: float, near: float = 0.0, share: int = 1) -> Array:
-    """Samples between an edge and another value, geometrically closer to the edge, up to the distance `near`.
+    """Samples between an edge and another value, geometrically closer to the edge, down to the distance `near` from it.
 
-    By default up to the distance that rounding allows; `share` divides the number of samples.
+    By default the least distance is what rounding allows; `share` divides the number of samples.
     """
     distance = abs(other - edge)
     least = near or _NEAREST * max(abs(edge), distance)

@@ -45,19 +45,19 @@ from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.sliding import explain_absence
 
-_ROUNDING = 64  # first distance, in units in the last place, within which two edges are merged
-_WIDER = 6  # number of distances tried, each 8 times wider: up to 1e-10 of the value, negligible for a verdict
+_ROUNDING = 64  # smallest distance, in units in the last place, within which two edges are merged
+_WIDER = 6  # number of distances tried, each 8 times the one before: up to 1e-10 of the value, negligible for users
 _BESIDE = 4  # a kind is the status plus multiples of this; kind % _BESIDE is the status
 # Limits of the scan, chosen by trial: computing time against edges missed where several lie close together.
 _FLAT = 1e-6  # relative depth of a minimum of a measure below which it is rounding error of a constant
-_DIPS = 16  # deepest dips that are examined: similar contacts have eigenvalues that jitter at every sample
-_ROUNDS = 8  # rounds of narrowing; each finds one more edge between two samples that have several between them
-_CHANGES = 64  # with more changes of kind only changes of status are narrowed, as the others are due to rounding
-_MORE = 8  # changes that a round may find beyond those of the round before
+_DIPS = 16  # most minima of the damping that are examined, deepest first; rounding may cause one at every sample
+_ROUNDS = 8  # most rounds of narrowing; where several edges lie between two samples, each round finds one more
+_CHANGES = 64  # if kinds change more often, only changes of status are narrowed; the other changes are due to rounding
+_MORE = 8  # a round may find this many changes more than the round before
 SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 _FEW = 8  # largest number of growing roots (with delay) at which a dip between two samples is examined
-_NEAR = 100.0  # factor from the own value within which roots of all samples must be countable
-_SCARCE = 6  # factor by which samples are fewer with several delays: their roots are counted rig by rig
+_NEAR = 100.0  # roots must be countable at all samples within this factor from the parameter's value in the rig
+_SCARCE = 6  # with several delays samples are fewer by this factor, as roots are counted rig by rig
 
 
 @dataclass(frozen=True)
@@ -164,12 +164,12 @@ class Search:
 
     @cached_property
     def _sizes(self) -> tuple[float, float]:
-        """Size of the rig's own value (of the natural one where that is 0), and natural size."""
+        """Size of the parameter's value in the rig (or, if that is 0, the typical size), and the typical size."""
         natural = self.natural_size()
         return abs(self.value) or natural, natural
 
     def _reach(self, between: tuple[float, float] | None) -> tuple[float, float]:
-        """Least and largest size of samples: decades around own and natural size, and the requested range."""
+        """Least and largest size of samples, which cover decades around the value and the requested range."""
         far, sizes = 10.0**samples.DECADES, self._sizes
         asked = [abs(end) for end in between or () if end]
         return min([min(sizes) / far, *asked]), max([max(sizes) * far, *asked])
@@ -191,7 +191,7 @@ class Search:
         return _kinds(point, status_where_counted(point))
 
     def measures(self, x: Array) -> Array:
-        """Two measures (2, n) that change sign at an edge: damping of pairs, and of single eigenvalues."""
+        """Two measures (2, n) that change sign at an edge: damping of pairs of eigenvalues, and of single ones."""
         return nearness(self.values(np.asarray(x, dtype=float)))
 
     def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
@@ -231,12 +231,12 @@ class Search:
         at = np.searchsorted(x, low, side="right") - 1
         below, above = kind[at] % _BESIDE, kind[at + 1] % _BESIDE
         real = (below != above) & (below != UNKNOWN) & (above != UNKNOWN)
-        if low.size and self.own.model.delays:  # a change to samples where nothing can be counted is no edge
+        if low.size and self.own.model.delays:  # a change to samples where roots cannot be counted is no edge
             hidden = np.any(self.status(np.concatenate([low, high])).reshape(2, -1) == UNKNOWN, axis=0)
             self.hides |= bool(np.any(real & hidden))
             real &= ~hidden
         if self.role.domain.low == 0:
-            real &= low != 0  # zero itself is the end of the domain, no edge
+            real &= low != 0  # 0 is the end of the domain, and no edge
         return [
             self._described(low[i], high[i], (x[at[i]], below[i]), (x[at[i] + 1], above[i]))
             for i in np.flatnonzero(real)
@@ -247,7 +247,10 @@ class Search:
         return grid, self.values(grid)
 
     def _judged(self, grid: Array, point: OperatingPoint) -> tuple[Array, NDArray[np.int64]]:
-        """Samples with their kinds; hidden windows are added, samples whose status depends on rounding are dropped."""
+        """Samples with their kinds.
+
+        Samples at narrow windows are added, those whose status depends on rounding dropped.
+        """
         valid = np.broadcast_to(point.valid, grid.shape)
         outside = grid[~valid], np.full(np.count_nonzero(~valid), UNKNOWN)
         here, point = (grid, point) if np.all(valid) else (grid[valid], self.values(grid[valid]))
@@ -276,7 +279,7 @@ class Search:
         return x[certain], _kinds(point, status_where_counted(point))[certain]
 
     def _hidden_windows(self, grid: Array, status: NDArray[np.int64], point: OperatingPoint) -> Array:
-        """Samples at dips of the damping towards zero, where a narrow window may lie between two samples."""
+        """Samples at minima of the damping close to zero, where a narrow window may lie between two samples."""
         measures, (low, high) = nearness(point), self.searched
         same = (status[1:-1] == status[:-2]) & (status[1:-1] == status[2:])
         same &= (status[1:-1] == STABLE) | (status[1:-1] == UNSTABLE)
@@ -289,7 +292,7 @@ class Search:
             dips &= np.maximum(size[:-2], size[2:]) > size[1:-1] * (1 + _FLAT)
             at = np.flatnonzero(dips & same & np.isfinite(measure[1:-1])) + 1
             at = at[np.argsort(size[at], kind="stable")]
-            usual = (grid[at] >= low) & (grid[at] <= high)  # a wider request must not change results inside
+            usual = (grid[at] >= low) & (grid[at] <= high)  # so that a wider request does not change edges inside
             at = np.sort(np.concatenate([at[usual][:_DIPS], at[~usual][:_DIPS]]))
             if at.size:
                 extra += self._descended(which, np.sign(measure[at]), grid[at - 1], grid[at + 1])
@@ -371,7 +374,10 @@ class Search:
         return ("oscillatory" if frequency else "divergence"), frequency
 
     def _exact(self, between: tuple[float, float] | None) -> StableSet | None:
-        """Exact stable set of a slider's stiffness or of a linear parameter of a machine; None for others."""
+        """Stable set in closed form for a slider's stiffness or a linear parameter of a machine.
+
+        None for other parameters.
+        """
         point = self.own
         late = bool(point.model.delays)
         if self.name == STIFFNESS:
@@ -383,7 +389,7 @@ class Search:
         return linear_set(point, self.name, None if self.value else self._sizes[0], self._reach(between))
 
     def _of_set(self, edges: StableSet, low: float, high: float) -> tuple[Boundary, ...]:
-        """Edges of an exact stable set from `low` to `high`."""
+        """Those edges of a stable set that lie between `low` and `high`."""
         keep = np.flatnonzero(edges.changes & (edges.edges >= low) & (edges.edges <= high))
         return tuple(
             self._exact_edge(float(edges.edges[i]), float(edges.frequencies[i]), edges.intervals) for i in keep
@@ -425,13 +431,14 @@ def natural_size(
 
 
 def _kinds(point: OperatingPoint, status: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Status of samples plus multiples of `_BESIDE` for positive static stiffness and for ill-posed equations."""
+    """Kind of each sample: its status, plus `_BESIDE` if the static stiffness is positive, plus 2 `_BESIDE` if
+    ill-posed."""
     more = _BESIDE * ((static_sum(point) > 0) & ~is_neutral(point)) + 2 * _BESIDE * is_ill_posed(point)
     return np.asarray(status + np.where((status == STABLE) | (status == UNSTABLE), more, 0))
 
 
 def _merged(*parts: tuple[Array, NDArray[np.int64]]) -> tuple[Array, NDArray[np.int64]]:
-    """Samples and their kinds, joined and sorted; one of each value."""
+    """Samples and their kinds, joined and sorted; equal samples are kept once."""
     x, at = distinct(np.concatenate([x for x, _ in parts]))
     return x, np.concatenate([kind for _, kind in parts])[at]
 
@@ -444,7 +451,8 @@ def _within(places: Array, low: Array, high: Array) -> NDArray[np.bool_]:
 
 @cached
 def _decay_function(model: Model) -> ArrayFunction:
-    """Function that gives the signed decay rates (1/s) of memory that depend on the rig's numbers alone."""
+    """Function that returns the decay rates (1/s), with sign, of those memory variables whose rate follows from the
+    rig's parameters alone."""
     linear = linearise(model)
     own = [linear.rows[item.symbol][item.symbol] for item in model.memory]
     known = {*model.arguments}

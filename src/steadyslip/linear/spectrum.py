@@ -18,11 +18,11 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.posed import late_on_springs, spare_powers
 from steadyslip.model.range import characteristic, delays_in_terms, quasipolynomial
 
-_ONE_CROSSING = 2  # largest number of roots that one crossing adds right of the axis: a conjugate pair
+_ONE_CROSSING = 2  # number of roots right of the axis after a conjugate pair has crossed it
 
 
 def spectrum(point: OperatingPoint) -> ComplexArray:
-    """Eigenvalues (1/s), (..., n), by falling real part, NaN padded; with delays the n rightmost.
+    """Eigenvalues (1/s), (..., n), by falling real part, padded with NaN; with delays only the n rightmost.
 
     n is the number of eigenvalues of the rig with all delays zero. Where some are lost to rounding (`digits_lost`),
     those of a single rig are computed with many digits; those of an array are NaN.
@@ -34,7 +34,7 @@ def spectrum(point: OperatingPoint) -> ComplexArray:
 
 @quietly
 def growth(point: OperatingPoint) -> Array:
-    """Largest real part (1/s) of the eigenvalues, (...); NaN where none is known.
+    """Largest real part (1/s) of the eigenvalues, (...); NaN where no eigenvalue is known.
 
     With a delayed highest derivative there may be no rightmost eigenvalue: infinitely many come arbitrarily near to a
     line, whose real part is returned then.
@@ -102,9 +102,9 @@ def unstable_roots(point: OperatingPoint) -> NDArray[np.int64]:
 
 
 def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where the equations are ill-posed: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3); see `spare_powers`.
+    """True where the equations are ill-posed: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3).
 
-    With delays also where the delayed terms of the highest derivative outweigh the undelayed one (`neutral`):
+    For zero coefficients see `spare_powers`. With delays also if delayed terms outweigh the undelayed one (`neutral`):
     oscillations of arbitrarily high frequency grow then.
     """
     if not point.model.delays:
@@ -156,7 +156,7 @@ def static_sum(point: OperatingPoint) -> Array:
 
 @cached
 def nearness(point: OperatingPoint) -> Array:
-    """Two measures, (2, ...), that change sign where a root crosses the imaginary axis: in pairs, or alone."""
+    """Two measures, (2, ...), that change sign where roots cross the imaginary axis: a pair of roots, or a single root."""
     if not point.model.delays:
         return damping_measures(spectrum(point))
     return with_delays.nearness(*quasipolynomial(point))
@@ -175,7 +175,7 @@ def crossing_frequency(point: OperatingPoint) -> float:
 
 
 def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:
-    """True where an oscillation neither grows nor decays (see `_negligible`).
+    """True where an oscillation neither grows nor decays: its real part is negligible (`_negligible`).
 
     With delays only the leading oscillation is tested, by a phase of at most `share` (rad).
     """
@@ -232,7 +232,7 @@ def outgrown(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray
 
 
 def _grows_late(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray[np.bool_]:
-    """Result of `outgrown` with delays, by a count of roots right of the line at `share` of their mean size."""
+    """Result of `outgrown` with delays, from a count of roots right of the line Re s = `share` times their mean size."""
     sets = delays_in_terms(point.model)
     with np.errstate(all="ignore"):
         c, h, _ = with_delays.nondimensional(*quasipolynomial(point))

@@ -39,7 +39,7 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
     Returns
     -------
     ndarray, shape (m, 2), or (..., m, 2), also xarray.DataArray, where parameters vary
-        Open intervals (low, high) in SI units, rising; high is inf where there is no upper limit. None: no value > 0.
+        Open intervals (low, high) in SI units, rising; high is inf where there is no upper limit. m may be 0.
         Rigs with fewer than m intervals are padded with NaN; of rigs with delay the lowest eight are given.
 
     Raises
@@ -147,7 +147,7 @@ def _require_positive(rig: Slider | Machine, name: str) -> None:
 
 
 def edge_along(rig: Slider | Machine, name: str, vary: Vary | None) -> tuple[Array, Array]:
-    """Nearest edge of a parameter's stable intervals, and the parameter's own value; SI units, (...) each.
+    """Nearest edge of a parameter's stable intervals, and the parameter's value in the rig; SI units, (...) each.
 
     Raises
     ------
@@ -180,7 +180,10 @@ def stable_intervals(point: OperatingPoint, name: str) -> Array:
 
 
 def nearest_value(intervals: Array, own: ArrayLike) -> Array:
-    """Positive finite end of a stable interval nearest to a rig's own value, (...); NaN without one."""
+    """Positive finite end of a stable interval that is nearest to the value `own` in the rig, (...).
+
+    NaN if there is none.
+    """
     ends = intervals.reshape(*intervals.shape[:-2], -1)
     ends = np.where((ends > 0) & np.isfinite(ends), ends, np.nan)
     return np.take_along_axis(ends, nearest_end(ends, own)[..., None], axis=-1)[..., 0]

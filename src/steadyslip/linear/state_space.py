@@ -79,7 +79,7 @@ def state_matrices(
 
 
 def _pressure_of(rig: Slider | Machine, name: str) -> float:
-    """Factor from a unit of an input to the Model's input: 1/area for forces on contacts with an area, else 1."""
+    """Factor that converts an input to the Model's unit: 1/area for a force on a contact with an area, else 1."""
     contact, _, kind = name.rpartition(".")
     if kind not in ("press", "pores"):
         return 1.0

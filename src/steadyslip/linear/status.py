@@ -26,8 +26,10 @@ from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.model.range import in_range
 
-ON_THE_EDGE = 1e-9  # damping ratio, and static stiffness relative to its terms, below which a rig is on an edge
-LAST_DIGITS = 24  # copies of a rig with perturbed last digits; by trial: computing time against a missed change
+ON_THE_EDGE = 1e-9  # a rig is on an edge if its damping ratio, or its static stiffness over its terms, is smaller
+# Number of copies of a rig, with parameters changed by rounding errors, of which the status is compared; by trial: more
+# copies miss fewer changes of status and take longer.
+LAST_DIGITS = 24
 ABSENT, STABLE, UNSTABLE, UNKNOWN, UNDAMPED = range(5)
 WORDS = ("no steady sliding", "stable", "unstable", "out of range", "undamped")
 """Names of the status values; "out of range" refers to floating point, "undamped" means that no disturbance grows."""
@@ -75,7 +77,7 @@ def stability(rig: Slider | Machine, vary: Vary | None = None) -> Any:
 
 
 def without_edge(point: OperatingPoint) -> NDArray[np.str_]:
-    """Text (...): reason why a rig has no critical stiffness; empty where it has one."""
+    """Reason (...) why a rig has no critical stiffness, as text; empty where it has one."""
     found = status(point)
     with np.errstate(all="ignore"):
         low, high = interval_ends(point)
@@ -86,7 +88,10 @@ def without_edge(point: OperatingPoint) -> NDArray[np.str_]:
 
 
 def status(point: OperatingPoint) -> NDArray[np.int64]:
-    """Status of rigs (...): one of the codes of `WORDS`; UNSTABLE also ill-posed, UNDAMPED of machines alone."""
+    """Status of rigs, (...), as an index of `WORDS`.
+
+    UNSTABLE includes ill-posed rigs; UNDAMPED is for machines only.
+    """
     with np.errstate(all="ignore"):
         found = _status(point, is_stable(point))
         if not np.any(undamped := (found == UNSTABLE) & is_undamped(point)):
@@ -108,8 +113,8 @@ def _status(point: OperatingPoint, stable: NDArray[np.bool_]) -> NDArray[np.int6
 def decided_by_rounding(point: OperatingPoint) -> bool:
     """True if changes in the last digits of a single rig's numbers change its status.
 
-    That is so at an edge, and if terms cancel that are many orders of magnitude larger than their sum; not if another
-    disturbance grows anyway.
+    That is so at an edge, and if terms cancel that are many orders of magnitude larger than their sum. It is not so if
+    another disturbance grows in any case.
     """
     if np.any(digits_lost(point)):  # its eigenvalues are computed with many digits, which arrays do not allow
         return False
@@ -127,7 +132,10 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
 
 @cached
 def _static_terms(model: Model) -> ArrayFunction:
-    """Function that gives the terms of a machine's static stiffness a0; none where a0 is not written out in symbols."""
+    """Function that returns the terms of a machine's static stiffness a0.
+
+    No terms if a0 is not written out in symbols.
+    """
     if not is_written_out(model):
         return model.function([])
     parts = (sp.Add.make_args(term.coefficients[0]) for term in characteristic_terms(model))
@@ -161,7 +169,7 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
         edge = np.array(np.broadcast_to(undamped | neutral, point.shape))
         if point.single or len(point.shape) != 1:
             return edge & ~outgrown(point, neutral, ON_THE_EDGE) if np.any(edge) else edge
-        rows = np.flatnonzero(edge)  # only a few, as eigenvalues take long with a delay
+        rows = np.flatnonzero(edge)  # outgrown takes long with a delay, so only for these rigs
         if rows.size:
             edge[rows] = ~outgrown(point.part(rows), np.broadcast_to(neutral, point.shape)[rows], ON_THE_EDGE)
         return edge

@@ -40,7 +40,7 @@ from steadyslip.model.steady import steady_equation
 
 STIFFNESS = "slider.stiffness"
 ONE_STIFFNESS = slider("of a machine's stiffnesses safety_factor and stable_values tell, each by its name")
-_CHUNK = 32768  # rigs at a time, 256 KiB per array of doubles, so that intermediate arrays stay in the cache
+_CHUNK = 32768  # number of rigs computed together: arrays of 256 KiB, so that intermediate results stay in the cache
 _LEAST = 1e-290  # smaller products (or larger than the inverse) use the general method; doubles end at 1e-308
 
 
@@ -227,14 +227,14 @@ def growth_rate(rig: Slider | Machine, vary: Vary | None = None) -> Any:
 
 
 def stiffness_polynomials(point: OperatingPoint) -> tuple[Array, Array]:
-    """p and q of p(s) + k q(s), each (..., n+1), lowest first; k is the spring's own stiffness."""
+    """p and q of p(s) + k q(s), each (..., n+1), lowest power first; k is the stiffness of the spring."""
     both = point.evaluate(_split_function(point.model))
     half = len(both) // 2
     return stacked(both[:half], point), stacked(both[half:], point)
 
 
 def _total_ends(point: OperatingPoint) -> tuple[Array, Array]:
-    """Lower and upper ends of the stable intervals of the stiffness with a controller's gain in it, (..., m)."""
+    """Lower and upper ends of the stable intervals of stiffness plus a controller's gain, (..., m) each."""
     if has_closed_form(point.model):
         low, high, _, lost = _closed_form_total(point)
         if not np.any(lost):
@@ -246,9 +246,11 @@ def _total_ends(point: OperatingPoint) -> tuple[Array, Array]:
 
 
 def general_set(point: OperatingPoint, *, edges: bool = False) -> StableSet:
-    """Stable set in stiffness from the characteristic equation of any Model; with a delay intervals only.
+    """Stiffness values at which rigs of any Model are stable, from the characteristic equation.
 
-    With `edges` an end at which only the searched range ends is NaN, as in `sets_of`.
+    With a delay the edges are empty.
+
+    With `edges`, an end of an interval that is only the end of the searched range is NaN, as in `sets_of`.
     """
     if point.model.delays:
         nothing = np.empty(0)
@@ -274,7 +276,7 @@ def _split_function(model: Model) -> ArrayFunction:
 
 
 def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
-    """Lower and upper end (Pa/m) of the one stable interval of stiffness, in closed form, for one memory variable."""
+    """Ends (Pa/m) of the only stable interval of stiffness, in closed form, for rigs with one memory variable."""
     low, high, gain, lost = _closed_form_total(point)
     low, high = cubic.without_gain(low, high, gain)
     if np.any(lost):
@@ -284,7 +286,7 @@ def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
 
 
 def _closed_form_total(point: OperatingPoint) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Ends of the interval of the stiffness with a controller's gain in it, that gain, and where digits may be lost."""
+    """Ends of the stable interval of stiffness plus a controller's gain, that gain, and True where digits may be lost."""
     exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(point.model)(point)
     low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3)
     return cubic.unless(exists, low), cubic.unless(exists, high), gain, _lost(numerator)
@@ -340,7 +342,7 @@ def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
 
 
 def _hopf_line(known: dict[str, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
-    """N and D of the condition D k > N, both divided by a2 > 0 where that leaves polynomials."""
+    """N and D of the condition D k > N; both are divided by a2 > 0 if the quotients are polynomials."""
     names = {key: sp.Integer(0) if value == 0 else inner_symbol(key) for key, value in known.items()}
     numerator, denominator = cubic.hopf_line(**names)
     a2 = cubic.coefficients(**names, k=sp.Integer(0))[2]
@@ -355,7 +357,11 @@ def _hopf_line(known: dict[str, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
 
 
 def set_of_one(point: OperatingPoint) -> StableSet:
-    """Stable set in stiffness of a single rig, with edges: in closed form where there is one.
+    """Stiffness values at which a single rig is stable, with the edges of this set.
+
+    The closed form is used if the model has one.
+
+    By the closed form where the model has one.
 
     The closed form keeps its digits where a large mass swamps the direct effect in the polynomial.
     """
@@ -394,12 +400,18 @@ def interval_ends(point: OperatingPoint, *, edges: bool = False) -> tuple[Array,
 
 
 def _nearest_edge(point: OperatingPoint) -> Array:
-    """Finite positive end of a stable interval (Pa/m) nearest to the rig's own stiffness, (...); NaN without one."""
+    """Finite positive end of a stable interval (Pa/m) that is nearest to the rig's stiffness, (...).
+
+    NaN if there is none.
+    """
     return _nearest(*interval_ends(point, edges=True), point.named()["slider.stiffness"])
 
 
 def _nearest(low: Array, high: Array, own: Array) -> Array:
-    """Finite positive end of intervals, (..., m) each, nearest to the rig's own value, (...); NaN without one."""
+    """Finite positive end of intervals, (..., m) each, that is nearest to the value `own`, (...).
+
+    NaN if there is none.
+    """
     if low.shape[-1] == 1:
         low, high = low[..., 0], high[..., 0]
         if not np.any(high < np.inf):  # shortcut for the common case, for speed

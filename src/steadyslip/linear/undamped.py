@@ -12,7 +12,7 @@ from steadyslip.model.range import characteristic
 
 
 def is_undamped(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True (...) where the characteristic polynomial has even powers of s only, with at least one above s^0.
+    """True (...) where the characteristic polynomial has only even powers of s, and not only s^0.
 
     False for a slider, which has a single oscillation that cannot couple with another.
     """
@@ -23,12 +23,12 @@ def is_undamped(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def squares(point: OperatingPoint) -> ComplexArray:
-    """Roots in s² of undamped rigs, (..., n); NaN where there are fewer."""
+    """Squares s² of the roots of undamped rigs, (..., n); NaN where a rig has fewer."""
     return roots(characteristic(point)[..., ::2])
 
 
 def grows(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where a root of undamped rigs grows, (...): one of the roots in s² is complex or positive."""
+    """True (...) where a root of an undamped rig grows: a squared root is complex or positive."""
     u = squares(point)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.any((u.imag != 0) | (u.real > 0), axis=-1))

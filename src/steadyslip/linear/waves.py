@@ -18,14 +18,15 @@ from steadyslip.linear.roots import Array, ComplexArray, evaluate
 _EPS = float(np.finfo(float).eps)
 _ROUNDING = 64 * _EPS  # rounding of a value f(ω), relative to the sum of the sizes of its terms
 _CANCELLED = 8 * _EPS  # coefficients below this, relative to the sizes of the products added, are set to zero
-_NARROW = 1e-13  # relative width at which halving ends: what is left is one zero, or two that nearly coincide
-_MOST = 400_000  # largest number of intervals at a time; by trial: memory against the length of delays
-_OCTAVES = 60  # zeros are searched down to 2**-60 of the highest frequency, beyond the digits of a double
+_NARROW = 1e-13  # relative width at which halving of an interval ends: it has one zero, or two that nearly coincide
+_MOST = 400_000  # largest number of intervals that are examined at a time; by trial: memory against long delays
+_OCTAVES = 60  # zeros are searched down to 2**-60 of the highest frequency, which is beyond the digits of a double
 
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """Function f(ω) of the module, as delays `shift` d (k,) and coefficients `cosine` a and `sine` b (k, r).
+    """The function f(ω) of this module: delays d in `shift` (k,), coefficients a in `cosine` and b in `sine`, (k, r)
+    each.
 
     Coefficients are in powers of ω, lowest first.
     """
@@ -49,11 +50,11 @@ class Waves:
         return Waves(self.shift, a + d * self.sine, b - d * self.cosine)
 
     def largest(self, x: Array) -> Array:
-        """Upper bound of |f| on [0, x]."""
+        """Upper bound of |f| on [0, x], for each x."""
         return np.asarray(evaluate(np.sum(np.abs(self.cosine) + np.abs(self.sine), axis=0), x))
 
     def stretched(self, unit: float) -> Waves:
-        """Function of ω/unit, scaled so that its largest coefficient is one."""
+        """The function with ω/`unit` as its variable, multiplied so that its largest coefficient is one."""
         powers = float(unit) ** np.arange(self.cosine.shape[1])
         a, b = self.cosine * powers, self.sine * powers
         size = max(float(np.max(np.abs(a))), float(np.max(np.abs(b)))) or 1.0
@@ -80,7 +81,10 @@ class Waves:
 
 
 def _enclosed(f: Waves) -> tuple[Array, Array, Array] | None:
-    """Ends of intervals in (0, 1] with one zero each, and the sign of the slope there; None if they are too many."""
+    """Ends of intervals in (0, 1] that have one zero each, and the sign of the slope there.
+
+    None if intervals are too many.
+    """
     slope = f.derivative()
     bend = slope.derivative()
     begin = _first(f, slope, bend)
@@ -125,7 +129,7 @@ def _first(f: Waves, slope: Waves, bend: Waves) -> float:
 
 
 def _products(p: Array, hp: Array, q: Array, hq: Array) -> list[tuple[float, ComplexArray, Array]]:
-    """Terms of P(iω) Q(iω)*, each as delay, coefficients in ω, and sizes of these before terms cancel."""
+    """Terms of P(iω) Q(iω)*: delay, coefficients in powers of ω, and the sizes of coefficients before terms cancel."""
     turn = 1j ** np.arange(max(p.shape[1], q.shape[1]))
     found = []
     for own, late in zip(p, hp, strict=True):
@@ -136,7 +140,7 @@ def _products(p: Array, hp: Array, q: Array, hq: Array) -> list[tuple[float, Com
 
 
 def _sum_of_terms(terms: list[tuple[float, Array, Array, Array]]) -> Waves:
-    """Sum of terms (delay, cosine, sine, size); those of one delay are added, and cancelled coefficients removed."""
+    """Sum of terms (delay, cosine, sine, size): terms of equal delay are added, cancelled coefficients set to zero."""
     width = max(len(cosine) for _, cosine, _, _ in terms)
     shifts = np.array([abs(delay) for delay, *_ in terms])
     unique: list[float] = []
@@ -155,7 +159,7 @@ def _sum_of_terms(terms: list[tuple[float, Array, Array, Array]]) -> Waves:
 
 
 def im_of_product(p: Array, q: Array, h: Array) -> Waves:
-    """Function Im P(iω) Q(iω)*, zero where P/Q is real; P and Q are (m, n+1) with delays h (m,)."""
+    """The function Im P(iω) Q(iω)*, which is zero where P/Q is real; P and Q are (m, n+1) with delays h (m,)."""
     return _sum_of_terms([(d, z.imag, -z.real, size) for d, z, size in _products(p, h, q, h)])
 
 

@@ -23,16 +23,16 @@ _PROMINENT = 0.5  # least rise of ln|response| at a peak above its surroundings;
 _DAMPED = 0.01  # damping ratio of starting poles; vector fitting moves them
 _BESIDE = 1.2  # frequency over the end of the band at which a mode beyond it is tried
 _NOTHING = 1e-9  # share of the largest response below which a response counts as rounding error
-_SMOOTHED = 9  # number of frequencies over which misfits are averaged to find where a mode is missing
+_SMOOTHED = 9  # number of neighbouring frequencies over which squared residuals are averaged to place a new mode
 _EVALUATIONS = 40  # most evaluations in least squares; from poles of vector fitting some five suffice
 _EXACT = 1e-22  # mean square misfit relative to the response below which it is rounding error
-_SURE = 4.0  # least damping of a mode in standard errors; less is a fit to a few errors of the response
-_MOST_MODES = 40  # bounds the time, as each further mode takes two fits of all; tests resolve fewer
+_SURE = 4.0  # least damping of a mode over its standard error; a mode with less is a fit to noise of the response
+_MOST_MODES = 40  # largest number of modes; bounds the time, as each further mode takes two fits of all modes
 _MOST_ENTRIES = 30_000_000  # most entries of the table of derivatives: 240 MB
 _POOR = 3.0  # mean square of misfits over errors above which the modes do not describe the response
 _FAR = 1e100  # m/N; powers of responses beyond this, or below its inverse, leave floating point
 _OUT_OF_RANGE = "modes are not identified: the response leaves the range of numbers; check units"
-_COARSE = 1e-2  # mean square of misfits over the response, for responses without errors, above which it is poor
+_COARSE = 1e-2  # like `_POOR`, for responses without errors: mean square of misfits relative to the response
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class IdentifiedModes(Displayed):
     names : tuple of str
         Points with directions: ``tip.x``.
     inside : ndarray of bool (k,)
-        True for modes within the band; each of the others represents several modes beyond the band.
+        True for modes within the band; a mode beyond the band represents several modes there.
     misfit : float
         Root mean square residual over the errors of the response, or over the response if errors are not given.
         Standard errors are multiplied by it if it is above one or errors are not given.
@@ -179,7 +179,10 @@ def _result(data: ResponseData, total: ModalSum, covariance: Array, misfit: floa
 
 @dataclass(frozen=True)
 class _Known:
-    """Responses (p, d, d) and weights: 1 over the standard deviation of real and imaginary part, 0 if not measured."""
+    """Responses (p, d, d) and weights.
+
+    A weight is 1 over the standard deviation of the real and imaginary part, 0 where not measured.
+    """
 
     omega: Array
     response: ComplexArray
@@ -269,8 +272,10 @@ class _Known:
         return np.asarray(places * (1j - _DAMPED))
 
     def _begin(self, poles: ComplexArray) -> ModalSum:
-        """Starting modes at poles, with shapes by rank-one fits to the residues; beyond the band a pole represents
-        several modes, and gets one for each direction."""
+        """Starting modes at the poles, with shapes by rank-one fits to the residues.
+
+        A pole beyond the band represents several modes, and gets one mode for each direction.
+        """
         size = self.response.shape[1]
         found, rest = residues(self.omega, *self.flat, poles)
         modes = []
@@ -299,13 +304,18 @@ class _Known:
         return ModalSum.from_unknowns(found.x, count, size)
 
     def _resolved(self, poles: ComplexArray) -> bool:
-        """True if every mode in the band is wider than the spacing of samples; fits to single errors are narrower."""
+        """True if every mode in the band is wider than the spacing of frequencies.
+
+        A fit to a single noisy value is narrower.
+
+        A fit to a single noisy value is narrower.
+        """
         inside = poles[poles.imag < self.omega[-1]]
         at = np.clip(np.searchsorted(self.omega, inside.imag), 1, len(self.omega) - 1)
         return bool(np.all(-2 * inside.real > self.omega[at] - self.omega[at - 1]))
 
     def _left(self, total: ModalSum) -> Array:
-        """Residuals over errors, real parts then imaginary parts, (2 p d d,)."""
+        """Residuals divided by the errors, (2 p d d,): first the real parts, then the imaginary parts."""
         off = ((total(1j * self.omega) - self.response) * self.weight).ravel()
         return np.concatenate([off.real, off.imag])
 

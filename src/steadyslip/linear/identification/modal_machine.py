@@ -12,7 +12,8 @@ from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
 from steadyslip.model.numeric.pencil import ComplexArray
 
-_NEWTON, _LAST, _STEP = 30, 1e-12, 1e-7  # most Newton steps, relative size of the last; of differences, ~sqrt(eps)
+# Newton's method: most steps, relative size of the last step, and relative step of differences (about sqrt(eps)).
+_NEWTON, _LAST, _STEP = 30, 1e-12, 1e-7
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,10 @@ class WithError:
 
 
 class ModalMachine:
-    """A machine whose structure is its identified modes: roots of det(I + R G), R the modal receptance, G contacts."""
+    """A machine whose structure is given by identified modes.
+
+    Its roots satisfy det(I + R G) = 0, with R the receptance of the modes and G the contacts.
+    """
 
     def __init__(self, measured: MeasuredMachine, modes: IdentifiedModes) -> None:
         self.measured, self.modes = measured, modes
@@ -130,7 +134,7 @@ class ModalMachine:
 
 
 def _solved(first: complex, second: complex, right: complex | ComplexArray) -> Array | None:
-    """Real a, b with a first + b second = right; None if `first` and `second` are parallel."""
+    """Real a and b with a · first + b · second = right; None if `first` and `second` are parallel."""
     rows = np.array([[first.real, second.real], [first.imag, second.imag]])
     try:
         return np.asarray(np.linalg.solve(rows, np.array([np.real(right), np.imag(right)])))

@@ -16,7 +16,7 @@ from steadyslip.model.numeric.pencil import ComplexArray
 
 @dataclass(frozen=True)
 class ModalSum:
-    """A reciprocal receptance in modes.
+    """A receptance as a sum of modes, reciprocal: the residues are symmetric.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 """Poles common to several responses by vector fitting (Gustavsen & Semlyen 1999, relaxed as by Gustavsen 2006).
 
-Starting poles for nonlinear least squares. Residuals are weighted by the errors, but noise biases the poles, as each
-step is a linear problem.
+The poles are starting values for nonlinear least squares: residuals are weighted by the errors, but as each step is a
+linear problem, noise biases the poles.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def relocated(omega: Array, responses: ComplexArray, weights: Array, poles: Comp
 
 
 def residues(omega: Array, responses: ComplexArray, weights: Array, poles: ComplexArray) -> tuple[ComplexArray, Array]:
-    """Residues (k, c) at given poles and real constants (c,) by least squares."""
+    """Residues (k, c) at given poles, and real constants (c,), of each response by least squares."""
     basis = _basis(1j * omega, poles, True)
     found = np.empty((basis.shape[1], responses.shape[1]))
     for c in range(responses.shape[1]):
@@ -35,7 +35,12 @@ def residues(omega: Array, responses: ComplexArray, weights: Array, poles: Compl
 
 
 def _basis(s: ComplexArray, poles: ComplexArray, constant: bool) -> ComplexArray:
-    """Partial fractions with real coefficients, (p, 2 k + 1): real and imaginary parts of residues, and one."""
+    """Partial fractions (p, 2 k + 1) at s.
+
+    For each pole the factors of the residue's real and imaginary part; last a constant 1.
+
+    Last a constant of 1.
+    """
     near, far = 1 / (s[:, None] - poles), 1 / (s[:, None] - poles.conj())
     pairs = np.stack([near + far, 1j * (near - far)], axis=-1).reshape(len(s), -1)
     return np.concatenate([pairs, np.ones((len(s), 1))], axis=1) if constant else pairs
@@ -46,7 +51,10 @@ def _real(rows: ComplexArray) -> Array:
 
 
 def _once(omega: Array, responses: ComplexArray, weights: Array, poles: ComplexArray) -> ComplexArray:
-    """Relocated poles: zeros of the Σ c/(s − p) + d whose product with each response is a sum over the poles p."""
+    """Poles after one relocation.
+
+    They are the zeros of Σ c/(s − p) + d, whose product with each response is a sum over the poles p.
+    """
     basis = _basis(1j * omega, poles, True)
     count = basis.shape[1]
     kept = []

@@ -196,7 +196,7 @@ class Program:
         return self._loads[key]
 
     def store(self, place: int, value: Value, array: str = "R") -> None:
-        """Add a store of a value to element `place` of the record R or of the array y."""
+        """Append an instruction that stores `value` in element `place` of the record R or the array y."""
         self.stores.append((array, int(place), as_node(value)))
 
     def nodes(self) -> list[Node]:

@@ -45,7 +45,10 @@ class Unread:
 
 @dataclass(frozen=True)
 class OfStructure(Entry):
-    """Field type: data of a structure; in files the name of a file, which is read before the field is checked."""
+    """Field type whose value is the data of a structure.
+
+    In a file the field holds the name of another file, which is read before the field is checked.
+    """
 
     doc: str
     of: type = StructureData

@@ -348,7 +348,10 @@ def steady_stress(model: Model, arguments: Arguments, branch: int, place: int) -
 
 
 def out_of_range(model: Model, arguments: Arguments, shape: tuple[int, ...]) -> Any:
-    """True, in `shape`, where the equations of σss overflow, so that existence of steady sliding is unknown."""
+    """Boolean array of `shape`, True where the equations of σss overflow.
+
+    It is unknown there whether steady sliding exists.
+    """
     found = np.zeros(shape, dtype=bool)
     joint = joint_equation(model)
     if joint is not None:

@@ -160,7 +160,8 @@ def record_event(R: Array, layout: Layout, number: int, tau: float, y: Array, lo
     kind = number - 2 * events_per_contact(layout) * contact
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     v, sign = y[n + Out.V], R[own + Row.NOW_SIGN]
-    if kind == Kind.SLIP_BEGINS or kind == Kind.BACKWARD_BEGINS:  # logged at the end, if it is a slip event
+    # not logged here: at the end of the slip, and only if it counts as a slip event
+    if kind == Kind.SLIP_BEGINS or kind == Kind.BACKWARD_BEGINS:
         R[own + Row.NOW_SIGN] = 1.0 if kind == Kind.SLIP_BEGINS else -1.0
         track_slowest(R, layout, contact, abs(v), tau, y)
     elif kind == Kind.SLIP_ENDS or kind == Kind.BACKWARD_ENDS:

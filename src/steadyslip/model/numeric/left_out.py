@@ -43,7 +43,12 @@ class LeftOut:
     force_by_pace: Array
 
     def of(self, mechanism: Mechanism) -> Mechanism:
-        """The mechanism without the others; its structures have the paces that they have there."""
+        """The mechanism with its structures replaced by `parts`, one for one.
+
+        Each takes over the pace of the structure it replaces.
+
+        Each takes over the pace of the structure it replaces.
+        """
         pairs = zip(self.parts, mechanism.structures, strict=True)
         return replace(mechanism, structures=tuple(replace(part, pace=one.pace) for part, one in pairs))
 

@@ -81,8 +81,6 @@ class Margin(Displayed):
         """The next edge below the value and the next above, nearer one first.
 
         A remote edge is given only if it is the nearest.
-
-        A remote edge only if it is the nearest.
         """
         found = edges_about(self.value, self.edges)
         return found[:1] + tuple(edge for edge in found[1:] if not self.is_remote(edge))
@@ -176,10 +174,7 @@ def _matrix_search(rig: Machine, name: str) -> MatrixSearch | MeasuredSearch:
 
 
 def _unknown(rig: Rig, search: Search | MatrixSearch | MeasuredSearch, low: float, high: float) -> str:
-    """Text that names the parameter and the parts of `low` to `high` in which its edges are unknown, or "".
-
-    Empty if there are none.
-    """
+    """Text that names the parameter and the parts of `low` to `high` in which its edges are unknown, or ""."""
     if search.hides:
         return f"{search.name} near some values"
     first, last = search.decided
@@ -271,8 +266,6 @@ def _zero_dampings(rig: Rig) -> tuple[str, ...]:
     """Names of a machine's dampings that are 0 but may be changed.
 
     Empty if the machine is undamped: any damping decides then.
-
-    none if the machine is undamped, as any damping decides then.
     """
     found = [name for name, one in rig.parameters().items() if name.endswith(".damping") and one.value == 0]
     if not found or by_matrices(rig) or is_undamped(operating_point(rig)):

@@ -103,8 +103,6 @@ def linear_split(
     """Polynomials p and q of p + f q, from its values at f = 1/`APART`, 1 and `APART`.
 
     The third result is True where the values are linear in f.
-
-    And True where the coefficients are linear in f.
     """
     p: list[Any] = []
     q: list[Any] = []

@@ -266,10 +266,7 @@ def _largest_between(p: Array, q: Array, sets: Sets, theta: Array) -> float:
 
 
 def _bound_of_terms(c: Array, sets: Sets) -> Array:
-    """Upper bounds (rows,) of frequencies of roots on the axis for c (rows, m, n+1); inf where none exists.
-
-    Inf where no bound exists.
-    """
+    """Upper bounds (rows,) of frequencies of roots on the axis for c (rows, m, n+1); inf where none exists."""
     bound = bound_on_axis(c, sets)
     where = leads(c) & np.isfinite(bound)
     bound[where] = np.minimum(bound[where], _last_crossing(c[where]))

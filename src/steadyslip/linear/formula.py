@@ -174,10 +174,7 @@ def formula_in_parts(rig: Slider | Machine, along: str | None = None) -> list[sp
 
 
 def _gathered(value: sp.Expr) -> sp.Expr:
-    """The sum with common factors taken out of each of its terms; roots and functions are not expanded.
-
-    Powers with broken exponents and functions are not expanded.
-    """
+    """The sum with common factors taken out of each of its terms; roots and functions are not expanded."""
     kept = [one for one in sp.ordered(value.atoms(sp.Pow, sp.Function)) if one.is_Function or not one.exp.is_Integer]
     names = {one: inner_symbol(f"kept_{i:03d}") for i, one in enumerate(kept)}
     terms = [sp.factor(term) for term in sp.Add.make_args(value.xreplace(names))]

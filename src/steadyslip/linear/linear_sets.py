@@ -81,8 +81,6 @@ def linear_sets(point: OperatingPoint, name: str) -> StableSet:
 
     They do not depend on the parameter's values in the rigs.
 
-    They do not depend on the parameter's values in the rigs.
-
     Raises
     ------
     NotAvailable
@@ -113,8 +111,6 @@ def _split(c: Array) -> tuple[Array, Array, Array]:
     """p and q of p + f q, from coefficients `c` (3, ...) at the factors f in `_FACTORS`.
 
     The third result is True where `c` is not linear in f.
-
-    And True where `c` is not linear in f.
     """
     low, own, high = (columns(one) for one in c)
     p, q, straight = linear_split(low, own, high)
@@ -136,8 +132,6 @@ def linear_set(
     point: OperatingPoint, name: str, size: float | None = None, reach: tuple[float, float] | None = None
 ) -> StableSet | None:
     """Stable set of one parameter of a single rig, SI units.
-
-    None if the parameter does not enter linearly or is not positive.
 
     None if the parameter does not enter linearly or is not positive.
 
@@ -203,8 +197,6 @@ def _balancing_factor(p: Array, q: Array) -> Array:
     """Factor f with which p and f q (..., n+1) have coefficients of similar size.
 
     It is a geometric mean; 1 if no power is in both.
-
-    1 if no power is in both.
     """
     both = (p != 0) & (q != 0)
     ratios = np.sum(np.where(both, np.log(np.abs(p)) - np.log(np.abs(q)), 0.0), axis=-1)

@@ -93,8 +93,6 @@ def search_matrices(machine: Machine, name: str) -> MatrixSearch:
     """Search for edges of stability.
 
     For a machine that is undamped at all values of the parameter, for edges of growth.
-
-    For a machine that is undamped at all values of the parameter, for edges of growth.
     """
     found = MatrixSearch(machine, name)
     if not found.own.balance.exists or not nothing_damps(found.own.pencil):

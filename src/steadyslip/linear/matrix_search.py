@@ -126,8 +126,6 @@ class MatrixSearch:
         """Array (p,) with the number of growing roots, ILL_POSED or UNDECIDED.
 
         For large machines it follows from the argument of a response.
-
-        For large machines from the argument of a response.
         """
         if self._small or self.turns is None:
             count = len(machines.posed)
@@ -247,10 +245,7 @@ class MatrixSearch:
         return tuple(found)
 
     def _edges(self, low: float, high: float, below: int, above: int) -> list[Boundary]:
-        """Edges between two values of different status: one, or two if steady sliding ends beyond an edge.
-
-        Where steady sliding ends there, it may end beyond another edge.
-        """
+        """Edges between two values of different status: one, or two if steady sliding ends beyond an edge."""
         if ABSENT not in (below, above):
             return [self._edge(low, high, below, above)]
         end = self._end(low, high)

@@ -41,10 +41,7 @@ class MeasuredSearch:
 
     @property
     def decided(self) -> tuple[float, float]:
-        """Range about the parameter's value in which stability is decided; known after `boundaries`.
-
-        Known after `boundaries`.
-        """
+        """Range about the parameter's value in which stability is decided; known after `boundaries`."""
         ends = [end for gap in self.gaps for end in gap]
         return (
             max((one for one in ends if one <= self.value), default=-np.inf),

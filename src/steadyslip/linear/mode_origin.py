@@ -233,8 +233,6 @@ class _Undamped:
         """Share of friction at which two modes meet, number of the lower mode, and frequency (rad/s).
 
         None if no modes meet.
-
-        None if no modes meet.
         """
         goal = complex(-(abs(self.target.imag) ** 2))
         middle, apart = self._pair(1.0, goal)

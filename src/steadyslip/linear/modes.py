@@ -134,8 +134,6 @@ class Mode(Displayed):
         """Directions in which a body moves, by the coordinates in `names`.
 
         Empty for a body that can only move along its surface.
-
-        Empty for a body that can only move along its surface.
         """
         if body + NORMAL not in self.amplitudes:
             return ""

@@ -106,10 +106,7 @@ def checked_spectrum(point: OperatingPoint) -> CheckedSpectrum:
 
 
 def _by_newton(point: OperatingPoint, first: CheckedSpectrum) -> tuple[ComplexArray, Array]:
-    """Eigenvalues under delays with their errors (1/s). Those with too large errors are computed with many digits.
-
-    Eigenvalues with too large errors are computed with many digits.
-    """
+    """Eigenvalues under delays with their errors (1/s). Those with too large errors are computed with many digits."""
     values, errors = first.values.copy(), first.errors.copy()
     last = 1 + _LAST * np.random.default_rng(0).choice([-0.5, 0.5], (_TRIALS, len(point.arguments)))
     others = [point.with_arguments([a * own for a, own in zip(point.arguments, row, strict=True)]) for row in last]

@@ -156,7 +156,7 @@ def static_sum(point: OperatingPoint) -> Array:
 
 @cached
 def nearness(point: OperatingPoint) -> Array:
-    """Two measures, (2, ...), that change sign where roots cross the imaginary axis: a pair of roots, or a single root."""
+    """Two measures, (2, ...), that change sign where a pair of roots, or a single root, crosses the imaginary axis."""
     if not point.model.delays:
         return damping_measures(spectrum(point))
     return with_delays.nearness(*quasipolynomial(point))
@@ -232,7 +232,7 @@ def outgrown(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray
 
 
 def _grows_late(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray[np.bool_]:
-    """Result of `outgrown` with delays, from a count of roots right of the line Re s = `share` times their mean size."""
+    """Result of `outgrown` with delays, from a count of roots right of Re s = `share` times their mean size."""
     sets = delays_in_terms(point.model)
     with np.errstate(all="ignore"):
         c, h, _ = with_delays.nondimensional(*quasipolynomial(point))

@@ -286,7 +286,7 @@ def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
 
 
 def _closed_form_total(point: OperatingPoint) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Ends of the stable interval of stiffness plus a controller's gain, that gain, and True where digits may be lost."""
+    """Ends of the stable interval of stiffness plus a controller's gain, the gain, and True if digits may be lost."""
     exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(point.model)(point)
     low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3)
     return cubic.unless(exists, low), cubic.unless(exists, high), gain, _lost(numerator)
@@ -360,8 +360,6 @@ def set_of_one(point: OperatingPoint) -> StableSet:
     """Stiffness values at which a single rig is stable, with the edges of this set.
 
     The closed form is used if the model has one.
-
-    By the closed form where the model has one.
 
     The closed form keeps its digits where a large mass swamps the direct effect in the polynomial.
     """

@@ -50,7 +50,7 @@ def assemble(
 
 
 class _Assembly(Forces):
-    """Builder of one Model from the forces and symbols of its mechanism."""
+    """Builder of one Model from a mechanism with symbols."""
 
     def model(self, given: dict[str, sp.Symbol], roles: Mapping[str, Parameter]) -> Model:
         coordinates = tuple(
@@ -149,7 +149,8 @@ class _Assembly(Forces):
     def _variables(
         self, coordinates: tuple[Coordinate, ...], contacts: tuple[Contact, ...]
     ) -> tuple[tuple[Variable, ...], tuple[sp.Expr, ...]]:
-        """Differential variables and their rates: coordinates, memory, controller integral, held force of the drive."""
+        """Differential variables and their rates: for coordinates, memory, the controller's integral, the held force
+        of the drive."""
         variables: list[Variable] = []
         rates: list[sp.Expr] = []
         for one, body in zip(coordinates, self.mechanism.coordinates, strict=True):
@@ -182,7 +183,10 @@ class _Assembly(Forces):
         return tuple(variables), tuple(rates)
 
     def _controller_error(self, senses: Shares) -> sp.Expr:
-        """Integrand of a controller: its error; 0 while the drive is released, then relative to the new position."""
+        """Error that a controller integrates.
+
+        0 while the drive is released, and afterwards relative to the place reached.
+        """
         found = row_of(senses, self.x)
         if not self.alternates:
             return found
@@ -245,7 +249,8 @@ class _Assembly(Forces):
         return seen
 
     def _law_observables(self, site: SymbolicContact) -> list[tuple[str, Observables, Observables]]:
-        """Observables of the friction law and the contact law: each with description, memory and observables."""
+        """Observables that the laws of a contact declare: for each law a description, its memory, and its
+        observables."""
         port, own = site.port, f"{site.port.name}." if site.port.name else ""
         stated = port.friction.observables(site.velocity, site.sigma, site.memory, site.tau)
         found: list[tuple[str, Observables, Observables]] = []
@@ -314,7 +319,7 @@ def check_names(place: str, law: FrictionLaw | ContactLaw, names: Iterable[str])
 
 
 def merge_observables(tables: Iterable[tuple[str, Observables]]) -> dict[str, tuple[sp.Expr, str]]:
-    """Merge tables of observables of several owners; equal observables of one name are kept once.
+    """One table of the observables of several owners; observables with equal names must be equal.
 
     Raises
     ------

@@ -88,7 +88,7 @@ def model_of(rig: Rig, present: Iterable[str] = (), drive: str = MOVED) -> Model
 
 
 class _Structure:
-    """Cache key that makes rigs of the same structure equal."""
+    """Cache key of a rig; keys of rigs with the same structure are equal."""
 
     def __init__(self, key: Any, rig: Rig, present: frozenset[str], drive: str) -> None:
         self.key, self.rig, self.present, self.drive = key, rig, present, drive
@@ -129,7 +129,10 @@ def _check_pulls(model: Model, mechanism: Mechanism) -> None:
 
 
 def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any], dict[sp.Symbol, str]]:
-    """Symbols of the rig's parameters by dotted name, and display letters; parameters whose 0 removes a term stay 0."""
+    """Symbols of the rig's parameters by dotted name, and their display letters.
+
+    A parameter that is 0, and whose term is then left out of the equations, is the number 0.
+    """
     symbols: dict[str, Any] = {}
     every, numbers = parameters(rig), in_matrices(rig)
     declared = Counter(address.role.letter for address in every.values())
@@ -153,7 +156,8 @@ def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any
 
 
 def in_matrices(rig: Rig) -> tuple[str, ...]:
-    """Names of structure parameters that enter the Model as numbers: point angles, spin, modal damping."""
+    """Names of structure parameters that the Model contains as numbers, not as symbols: point angles, spin, modal
+    damping."""
     found = []
     for body, one in rig.bodies.items():
         if one.is_structure:
@@ -169,7 +173,7 @@ def _plain_letter(name: str, address: Address) -> str:
 
 
 def _owned(name: str, address: Address) -> str:
-    """Letter of a parameter, prefixed by the machine member and index that make it unique: `bodies.pad.m`."""
+    """Letter of a parameter, preceded by the names that make it unique in a machine: `bodies.pad.m`."""
     before = name.split(".")[:-1]
     if before[0] in MEMBERS:
         before = [*before[:2], *(one for one in before[2:] if one.isdigit())]

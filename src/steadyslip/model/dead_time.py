@@ -47,14 +47,15 @@ def transport(order: int) -> Transport:
     ahead = k[None, :] >= k[:, None]
     matrix = -np.outer(size, size) * np.where(ahead, 1.0, (-1.0) ** (k[:, None] - k[None, :]))
     upper, turned = schur(matrix, output="real")
-    turned = turned * np.where(turned.T @ (size * (-1.0) ** k) < 0, -1.0, 1.0)  # LAPACK's signs are arbitrary
+    # LAPACK chooses signs arbitrarily; these make them unique
+    turned = turned * np.where(turned.T @ (size * (-1.0) ** k) < 0, -1.0, 1.0)
     upper = np.triu(turned.T @ matrix @ turned, -1) * (np.abs(np.tril(upper, -1)) + np.triu(np.ones_like(upper)) > 0)
     return Transport(upper, turned.T @ (size * (-1.0) ** k), turned.T @ size)
 
 
 @dataclass(frozen=True, eq=False)
 class LateSignal:
-    """A signal that acts late, in a Model for motion.
+    """A signal that acts after a delay, represented by variables of a Model for motion.
 
     Attributes
     ----------

@@ -35,7 +35,7 @@ def order_for(point: OperatingPoint) -> int:
 
 
 def finer_order(order: int) -> int:
-    """Next larger number of variables of a late signal, with which a motion is checked."""
+    """The next larger number of variables of a late signal; a motion computed with it checks the number before."""
     return ORDERS[ORDERS.index(order) + 1]
 
 

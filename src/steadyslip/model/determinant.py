@@ -32,14 +32,15 @@ class TooManyTerms(Exception):
 
 
 class Placeholders:
-    """Placeholder symbols of subexpressions that are not polynomials, for exact polynomial arithmetic with the rest."""
+    """Symbols that replace subexpressions which are not polynomials, so that exact polynomial arithmetic is
+    possible."""
 
     def __init__(self) -> None:
         self.names: dict[sp.Symbol, sp.Expr] = {}
         self._known: dict[sp.Expr, sp.Symbol] = {}
 
     def symbol_for(self, expression: sp.Expr) -> sp.Expr:
-        """New placeholder of an expression; whole numbers are returned unchanged."""
+        """A new symbol that replaces an expression; whole numbers are returned unchanged."""
         if expression.is_Integer:
             return expression
         symbol = inner_symbol(f"e{len(self.names)}")
@@ -51,7 +52,7 @@ class Placeholders:
         e = sp.sympify(expression)
         if e.is_Symbol or e.is_Integer:
             return e
-        if e.is_Number:  # the ring has whole coefficients
+        if e.is_Number:  # coefficients of the ring are whole numbers
             if e not in self._known:
                 self._known[e] = inner_symbol(f"e{len(self.names)}")
                 self.names[self._known[e]] = e
@@ -72,7 +73,7 @@ class Placeholders:
 def determinant(
     matrix: list[list[Polynomial]], longest: int | None = None
 ) -> tuple[list[sp.Symbol], dict[Powers, Terms]]:
-    """Expand a determinant whose entries are polynomials in symbols with integer coefficients.
+    """Determinant of a matrix of polynomials in symbols with integer coefficients, expanded.
 
     Laplace expansion by rows; each minor of the rows below is computed once.
 
@@ -162,7 +163,8 @@ def machine_determinant(model: Model, rows: Rows, tensions: Sequence[sp.Symbol] 
 class _Block:
     """Memory and friction of a contact condensed to one row of the matrix: D τ + Σ G_j x_j = 0, by Cramer's rule.
 
-    `symbols` are the symbols of G_j by column, `whole` is that of D; `values` has the polynomials of all.
+    `symbols` has the symbol of G_j by column j, `whole` is the symbol of D; `values` has the polynomials of all
+    symbols.
     """
 
     def __init__(self, rows: Rows, columns: Mapping[sp.Symbol, int], index: int, model: Model) -> None:
@@ -185,7 +187,7 @@ class _Block:
 
 
 def without_cancellation(matrix: list[list[Polynomial]]) -> Polynomial | None:
-    """Determinant of a small matrix expanded in its symbols if terms cancel in it; None if no terms cancel.
+    """Determinant of a small matrix, expanded in its symbols, if terms cancel in it; else None.
 
     Terms cancel where friction depends on the rate of its own memory variable, as for bristles with damping. These
     products of slopes may be many orders larger than the rest, so that in floating point they would not cancel.

@@ -5,7 +5,7 @@ characteristic matrix at one real s. Structural cancellations are subject to rou
 
 The descriptor system (differential-algebraic form) of the linearised rig has balances as algebraic equations, for
 accelerations, friction stresses and velocities of massless bodies. If they are singular in these, as for a massless
-body between two springs, they constrain displacements: one of those is no state then, and the balance is
+body between two springs, they constrain displacements: one of the displacements is then no state, and the balance is
 differentiated (index reduction).
 """
 
@@ -26,8 +26,8 @@ from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_rows, is_written_out, linearise, sets_of_delays
 from steadyslip.model.point import OperatingPoint, stacked
 
-ZERO_TOLERANCE = 1e-11  # relative to the largest entry; sums that cancel leave a smaller rounding error; by trial
-LEAST_PIVOT = 1e-6  # relative to the largest pivot; a smaller one would lose six of 16 digits; by trial
+ZERO_TOLERANCE = 1e-11  # an entry smaller than this share of the largest counts as 0 (sum that cancels); by trial
+LEAST_PIVOT = 1e-6  # least pivot over the largest; elimination with a smaller pivot loses six of 16 digits; by trial
 UNDETERMINED = "ill-posed: the balances of forces do not determine the motion"
 
 
@@ -104,7 +104,10 @@ class Descriptor:
         )  # fmt: skip
 
     def _singular_balances(self) -> tuple[NDArray[np.int64], Array] | None:
-        """Combinations of balances in which z cancels: rows to replace, and coefficients; None if there are none."""
+        """Combinations of balances in which z cancels: rows to be replaced, and coefficients.
+
+        None if there are no such combinations.
+        """
         matrix = self.balance_z
         rows = np.max(np.abs(np.hstack([matrix, self.balance_x])), axis=1)
         even = matrix / np.where(rows > 0, rows, 1.0)[:, None]
@@ -121,7 +124,8 @@ class Descriptor:
         return np.asarray(gone, dtype=np.int64), combined / np.where(rows > 0, rows, 1.0)
 
     def _index_reduced(self, rows: NDArray[np.int64], left: Array) -> Descriptor:
-        """Replace `rows` by the time derivatives of the combinations `left`, and remove as many states."""
+        """The system with `rows` replaced by the time derivatives of the combinations `left`, and as many states
+        removed."""
         constraint = left @ self.balance_x
         count, n = constraint.shape
         gone: list[int] = []
@@ -140,7 +144,7 @@ class Descriptor:
             work[below] -= np.outer(work[below, j], work[i])
             gone.append(j)
         kept = [j for j in range(n) if j not in gone]
-        whole = np.zeros((n, len(kept)))  # all x as linear functions of the remaining ones
+        whole = np.zeros((n, len(kept)))  # all states as linear functions of the remaining states
         whole[kept, range(len(kept))] = 1.0
         whole[gone] = -work[:, kept]
         others = np.delete(np.arange(len(self.balance_z)), rows)
@@ -212,7 +216,8 @@ Delays = tuple[sp.Expr, ...]
 
 MOVED = 1e-6
 """Relative change of an eigenvalue by rounding that is accepted: the tolerance of the checks of eigenvalues."""
-_ROUNDING = 4 * np.finfo(float).eps  # relative error of matrix entries, which a few operations make of parameters
+# relative error of matrix entries, which are made of parameters by a few operations
+_ROUNDING = 4 * np.finfo(float).eps
 
 
 @cached
@@ -305,7 +310,7 @@ def _eigenvalues(point: OperatingPoint, late: Delays) -> tuple[NDArray[np.comple
 
 
 def _of_matrix(a: Array) -> tuple[NDArray[np.complex128], Array]:
-    """Eigenvalues of matrices (..., n, n), and the change of each per relative change of all entries, both (..., n)."""
+    """Eigenvalues of matrices (..., n, n), and the change of each per relative change of all entries, (..., n) each."""
     found, right = np.linalg.eig(a)
     singular = np.linalg.det(right) == 0  # a multiple eigenvalue with fewer eigenvectors
     left = np.linalg.inv(np.where(singular[..., None, None], np.eye(a.shape[-1]), right))

@@ -34,7 +34,7 @@ class Coordinate:
     inertial : bool
         True if the velocity is a variable (with inertia, or if a normal stress depends on the acceleration).
     balance : sympy.Expr or None
-        Inertia minus forces, zero in motion; None for a slider, whose contact has the only balance.
+        Inertia minus forces, zero in motion; None for a slider, whose only balance is that of its contact.
     unit : str
         Unit of the displacement, m or rad.
     push : sympy.Symbol
@@ -293,7 +293,7 @@ class Model(HasCache, Displayed):
 
     @property
     def is_single(self) -> bool:
-        """True for one block on one contact, described by a single equation."""
+        """True if the rig is one block on one contact, described by a single balance."""
         return len(self.contacts) == len(self.coordinates) == 1 and self.coordinates[0].balance is None
 
     @property

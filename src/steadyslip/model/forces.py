@@ -28,7 +28,7 @@ INTEGRAL = inner_symbol("I_x", real=True)
 
 @dataclass(frozen=True, eq=False)
 class SymbolicContact:
-    """Symbols of a contact during assembly."""
+    """Symbols of a contact while the Model is assembled."""
 
     port: ContactPort
     slip: sp.Expr
@@ -48,7 +48,8 @@ class SymbolicContact:
     def tau_ss(self) -> sp.Expr:
         """Friction stress in steady sliding."""
         given = self.speed, self.sigma_ss
-        all_of_law(self.port.friction, "steady_memory", len(self.memory), *given)  # checked first: strength may use it
+        # checked before the strength, which may use the memory
+        all_of_law(self.port.friction, "steady_memory", len(self.memory), *given)
         return of_law(self.port.friction, "steady_strength", *given)
 
 
@@ -97,7 +98,7 @@ class Forces:
     Attributes
     ----------
     imposed, alternates : bool
-        `imposed`: the force of the drive is imposed for all or part of the run; `alternates`: for part of it.
+        `imposed`: the force of the drive is imposed for all or part of the run; `alternates`: for part of the run.
     single, bare : bool
         `single`: one block on one contact (a slider); `bare`: contacts have no names.
     x, v, a, push : dict of str to sympy.Symbol
@@ -214,7 +215,7 @@ class Forces:
         return statics(self.mechanism, friction, normal, self.letters.symbol)
 
     def _simplified(self, expression: sp.Expr) -> sp.Expr:
-        """Result of the statics in lowest terms, so that stiffnesses without influence cancel."""
+        """Result of the statics in lowest terms, so that stiffnesses cancel on which it does not depend."""
         if self.statics.carried is not None:
             return expression.xreplace(self.friction)
         return sp.cancel(sp.together(expression)).xreplace(self.friction)
@@ -237,7 +238,8 @@ class Forces:
         )
 
     def _grouped(self, elements: list[Element]) -> list[Element]:
-        """Combine elements with equal rows and delay, such as a spring and a controller in parallel, into one."""
+        """The elements, with those combined that act and sense alike with equal delay, such as a parallel spring and
+        controller."""
         groups: dict[Any, list[Element]] = {}
         for one in elements:
             groups.setdefault((tuple(one.acts.items()), tuple(one.senses.items()), one.delay), []).append(one)
@@ -328,7 +330,7 @@ class Forces:
 
     @cached_property
     def letting_go(self) -> LettingGo | None:
-        """Expressions for a drive whose motion and imposed force alternate; None for others."""
+        """Expressions for a drive whose motion and force are imposed in turn; None for other drives."""
         if not self.alternates:
             return None
         stiffness = self._at_drive() * sp.Add(*(e.stiffness * e.senses[LOAD_POINT] for e in self.drive_elements))

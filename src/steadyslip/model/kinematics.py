@@ -1,8 +1,8 @@
 """Choice of the velocity variables of a Model, and all other velocities as functions of them.
 
 Each contact has a preferred velocity variable w, such as ln v, in which its friction law is smooth; w replaces the
-velocity of one coordinate that contributes to the slip. If all such coordinates are already replaced (a body on two
-contacts), the slip rate is a function of the other variables.
+velocity of one coordinate that contributes to the slip. If the velocities of all these coordinates are already replaced
+(a body on two contacts), the slip rate is a function of the other variables.
 """
 
 from __future__ import annotations
@@ -177,7 +177,10 @@ def _is_product_with_sum(expression: sp.Expr, w: sp.Symbol) -> bool:
 
 
 def solve_linear(residual: sp.Expr, unknown: sp.Symbol) -> sp.Expr | None:
-    """Root of a residual that is linear in an unknown; None if it is nonlinear or does not contain the unknown."""
+    """Value of an unknown at which a residual is zero.
+
+    None if the residual is nonlinear in it or does not contain it.
+    """
     slope = derivative(residual, unknown)
     if slope.has(unknown) or slope == 0:
         return None
@@ -187,7 +190,7 @@ def solve_linear(residual: sp.Expr, unknown: sp.Symbol) -> sp.Expr | None:
 def solve_sequentially(
     equations: Iterable[tuple[sp.Expr, sp.Symbol]],
 ) -> tuple[dict[sp.Symbol, sp.Expr], list[tuple[sp.Expr, sp.Symbol]]]:
-    """Solve pairs of (residual, unknown) one after the other by substitution.
+    """Solve each residual for its unknown in turn, and substitute the solution in all others.
 
     Returns the solutions, and the pairs whose residual is not linear in its unknown, with all solutions substituted.
     """

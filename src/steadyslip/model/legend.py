@@ -15,7 +15,7 @@ STATE_OF_LAW = "state of friction, as its law is described"
 
 
 def legend(model: Model) -> dict[str, Meaning]:
-    """SI unit and meaning of each letter that may occur in the equations, by the letter as written.
+    """SI unit and meaning of each letter that may occur in the equations; keys are the letters as written.
 
     >>> from steadyslip.model import build_model
     >>> from steadyslip.reproduce import paper_rig
@@ -57,7 +57,7 @@ def states_of_laws(model: Model) -> Iterator[sp.Eq]:
 
 
 def letters_in(expressions: Iterable[sp.Basic]) -> Iterator[str]:
-    """Names of the symbols and functions of expressions, in order of appearance, each once."""
+    """Names of the symbols and functions in expressions, in order of appearance, without repetition."""
     seen: dict[str, None] = {}
     for expression in expressions:
         for one in sp.preorder_traversal(expression):

@@ -115,7 +115,7 @@ def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
 
 @cached
 def characteristic_terms(model: Model) -> tuple[Term, ...]:
-    """Terms of the characteristic equation: polynomials in s times exp(−s delay), the one without delay first.
+    """Terms of the characteristic equation: polynomials in s times exp(−s delay), first the term without delay.
 
     Each delay occurs at most once as a factor, because a delayed controller or contact exerts a single force.
 
@@ -178,7 +178,7 @@ def delays_of_terms(model: Model) -> list[tuple[sp.Expr, ...]]:
 
 
 def sets_of_delays(model: Model) -> list[tuple[sp.Expr, ...]]:
-    """All subsets of the delays, the empty one first."""
+    """All subsets of the delays, the empty set first."""
     return [late for count in range(len(model.delays) + 1) for late in combinations(model.delays, count)]
 
 

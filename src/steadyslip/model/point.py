@@ -94,7 +94,7 @@ class OperatingPoint(HasCache):
 
     @property
     def axial_share(self) -> Any:
-        """Ratio of k to the axial stiffness, if that is given."""
+        """Ratio of k to the axial stiffness, if the axial stiffness is given."""
         return _axial_share(self.model)(self.named())
 
     @property
@@ -134,7 +134,7 @@ class OperatingPoint(HasCache):
         return function.rows(table)
 
     def pieces(self, most: int) -> Iterator[OperatingPoint]:
-        """Yield flat points with at most `most` rigs each; the point itself if it is not larger."""
+        """Yield points with one axis and at most `most` rigs each; the point itself if it has no more rigs."""
         if self.size <= most:
             yield self
             return
@@ -144,7 +144,7 @@ class OperatingPoint(HasCache):
             yield OperatingPoint(self.model, part, (min(most, self.size - start),), self.wrap, self.branch)
 
     def part(self, rows: slice | np.ndarray) -> OperatingPoint:
-        """Point with the selected rigs of a point of one axis; steady states are reused."""
+        """Point with the selected rigs of a point that has one axis; steady states are not computed again."""
         if self.single:
             return self
         whole = (*self.arguments, *self.steady, self.valid)
@@ -155,12 +155,12 @@ class OperatingPoint(HasCache):
         return found
 
     def with_arguments(self, arguments: Iterable[Any], shape: tuple[int, ...] | None = None) -> OperatingPoint:
-        """Copy with other values, which are not checked."""
+        """Copy with other values of the parameters, which are not checked."""
         return replace(self, arguments=tuple(arguments), shape=self.shape if shape is None else shape)
 
 
 def stacked(parts: list[Any], point: OperatingPoint) -> np.ndarray:
-    """Stack values along a last axis, (..., parts), at the shape of the point; NaN without steady sliding."""
+    """Values stacked along a new last axis, (..., parts), with the shape of the point; NaN without steady sliding."""
     out = np.empty((*point.shape, len(parts)))
     for i, part in enumerate(parts):
         out[..., i] = part

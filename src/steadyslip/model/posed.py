@@ -13,7 +13,7 @@ from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.weights import arrays_of, slip_rates, weights
 
-_UNDETERMINED = 1e-9  # relative to other dampings; a smaller one does not determine a velocity
+_UNDETERMINED = 1e-9  # damping over other dampings, below which it does not determine a velocity
 MOST_NOISE = 1e-2  # largest accepted change of ln v due to rounding of forces; chosen by trial
 
 
@@ -97,7 +97,8 @@ def spare_powers(point: OperatingPoint) -> np.ndarray:
 
 @cached
 def late_on_springs(point: OperatingPoint) -> np.ndarray:
-    """True (...) where a delayed force acts on the motion it measures, of massless bodies held by springs only.
+    """True (...) where a delayed force acts on the motion that it measures, and the bodies have no mass and are held by
+    springs only.
 
     With a mass m on springs k, m s² + k + kp exp(−s delay) has more unstable roots, with larger growth rates, the
     smaller m is. The equations without mass are therefore ill-posed, even if their own roots decay.
@@ -122,7 +123,8 @@ def late_on_springs(point: OperatingPoint) -> np.ndarray:
 
 @cached
 def _late_entries(model: Model) -> list[sp.Expr]:
-    """Derivatives of coordinates' forces with respect to each delayed displacement or velocity, (n, n) by rows each."""
+    """Derivatives of the coordinates' forces with respect to each delayed displacement or velocity: (n, n) each, by
+    rows."""
     linear = linearise(model)
     places = {symbol: one for one in model.coordinates for symbol in (one.displacement, one.velocity)}
     found = []
@@ -173,7 +175,8 @@ def _dissipation(model: Model) -> ArrayFunction:
 
 @cached
 def _determined_in_general(model: Model) -> int:
-    """Number of massless coordinates' velocities that friction and dampings determine, for generic parameter values."""
+    """Number of velocities of massless coordinates that friction and dampings determine for generic parameter
+    values."""
     light = ~_inertial(model)
     if not np.any(light & ~_of_contacts(model)):
         return int(np.sum(light))
@@ -190,7 +193,7 @@ def _determined(values: np.ndarray, light: np.ndarray) -> np.ndarray:
 
 
 def _damped(values: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """Symmetric matrix (rigs, n, n) whose null space is the motions that neither dampings nor contacts resist."""
+    """Symmetric matrix (rigs, n, n) that is singular for motions which neither dampings nor contacts resist."""
     whole = _resistance(values, light)
     return np.asarray(np.swapaxes(whole, 1, 2) @ whole + np.eye(light.shape[-1]) * ~light[:, None, :])
 
@@ -215,7 +218,7 @@ def _rising(model: Model) -> tuple[ArrayFunction, int]:
 
 @cached
 def _force_function(model: Model, index: int) -> ArrayFunction:
-    """Array function of the sizes of stresses (Pa) at a contact in steady sliding.
+    """Array function of stresses (Pa) at a contact in steady sliding, by which rounding is judged.
 
     In this order: change of the pull by dashpots per e-fold of v; changes of σ by pull and friction; pull; friction;
     contributions of normal stress and memory to friction.

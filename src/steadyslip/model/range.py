@@ -50,7 +50,7 @@ def characteristic(point: OperatingPoint) -> Array:
 
 @cached
 def quasipolynomial(point: OperatingPoint) -> tuple[Array, Array]:
-    """Characteristic quasipolynomial: polynomials in s times exp(−s delay), the one without delay first.
+    """Characteristic quasipolynomial: polynomials in s times exp(−s delay), first the polynomial without delay.
 
     Returns
     -------
@@ -225,7 +225,8 @@ def _out_of_range_message(point: OperatingPoint) -> str:
 
 
 def _blamed_parameters(point: OperatingPoint) -> Iterator[str]:
-    """Yield the parameters that bring a rig into range if moved towards 1: singly, or all extreme ones together."""
+    """Yield the parameters that bring a rig into range if they are moved towards 1: one alone, or all extreme
+    parameters together."""
     names = list(point.model.parameters)
     numbers = np.array([float(value) for value in point.arguments])
     with np.errstate(all="ignore"):
@@ -274,9 +275,9 @@ def loses_highest_power(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def highest_coefficients(model: Model) -> list[list[Pair]]:
-    """Coefficients of the characteristic equation that may vanish as exponentials underflow, highest power of s first.
+    """Coefficients of the highest powers of s that may vanish if exponentials underflow, highest power first.
 
-    For each power the coefficients of all terms, the term without delay first; empty if there are no exponentials.
+    For each power it has the coefficients of all terms, first the term without delay; empty without exponentials.
     """
     terms = [term.coefficients for term in characteristic_terms(model)]
     rows = [list(row) for row in zip(*terms, strict=True)]
@@ -287,7 +288,7 @@ def highest_coefficients(model: Model) -> list[list[Pair]]:
 def highest_is_lost(levels: Sequence[Sequence[Pair]], choose: Choose = np.where) -> Any:
     """1 where the highest coefficient (of `highest_coefficients`) is 0 only because of underflow, else 0.
 
-    A term with a delay counts above the highest power without delay: there it makes the equation ill-posed.
+    A term with a delay counts only above the highest power without delay, where it makes the equation ill-posed.
 
     Parameters
     ----------
@@ -307,14 +308,18 @@ def highest_is_lost(levels: Sequence[Sequence[Pair]], choose: Choose = np.where)
 
 
 def _loses_generic_degree(point: OperatingPoint) -> NDArray[np.bool_]:
-    """`loses_highest_power` for equations known only as a matrix in s; its degree is that without cancellations."""
+    """Result of `loses_highest_power` for equations known only as a matrix in s.
+
+    Its degree is taken as if no terms cancelled.
+    """
     from scipy.optimize import linear_sum_assignment  # slow to import
 
     function, places, size = _matrix_function(point.model)
     values = np.stack([np.broadcast_to(one, point.shape) for one in point.evaluate(function)], axis=-1)
     lost = np.zeros(point.shape, dtype=bool)
     for index in np.ndindex(point.shape):
-        degrees = []  # without, then with delayed entries; each with exponentials set to 0, then bounded below
+        # of the entries without delay, then with delay; each with exponentials set to 0, then bounded below
+        degrees = []
         for with_delays in (False, True):
             for start in (0, 1):
                 matrix = np.full((size, size), _ABSENT)
@@ -329,7 +334,8 @@ def _loses_generic_degree(point: OperatingPoint) -> NDArray[np.bool_]:
 
 @cached
 def _matrix_function(model: Model) -> tuple[ArrayFunction, list[tuple[int, int, int, bool]], int]:
-    """Array function of a `Pair` per entry of the characteristic matrix; (row, column, power, is late); matrix size."""
+    """Array function of a `Pair` for each entry of the characteristic matrix, the places of the entries, and the
+    matrix size. A place is row, column, power of s, and True for a delayed entry."""
     rows = list(characteristic_rows(model).values())
     places, entries = [], []
     for i, row in enumerate(rows):

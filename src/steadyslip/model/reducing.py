@@ -115,7 +115,8 @@ class _Reducer:
         return next((c for c in self.model.contacts if stress in (c.spring, c.friction, c.normal)), None)
 
     def _variables(self, expression: sp.Expr, contact: Contact | None) -> sp.Expr:
-        """Expression with channels for inputs, in the velocity variables, with the smooth replacement of sign(v)."""
+        """The expression with channels in place of inputs, velocity variables, and the smooth replacement of
+        sign(v)."""
         expression = expression.xreplace(self.given)
         if contact is not None:
             v, direction = contact.velocity, contact.direction
@@ -123,7 +124,7 @@ class _Reducer:
         return in_variables(expression, self.moving, self.model)
 
     def inlined(self, expression: sp.Expr) -> sp.Expr:
-        """Expression with T, τ, σ and the solved massless coordinates substituted."""
+        """The expression with T, τ, σ and the displacements or velocities of massless coordinates substituted."""
         return replaced(self.model.inlined(expression, self.definitions), self.found)
 
     # -- assignment of equations
@@ -176,7 +177,7 @@ class _Reducer:
                 self._reject("the motion of a body without mass is set by the drive alone, which this run releases")
 
     def _dependent_velocity(self, one: Coordinate, found: Replacements) -> sp.Expr:
-        """Velocity of a coordinate whose displacement is a function of others."""
+        """Velocity of a coordinate whose displacement is a function of other displacements."""
         place = found[one.displacement]
         drift = self.rates[one.displacement].xreplace({one.velocity: sp.Integer(0)})
         terms = [derivative(place, s) * rate for s, rate in self.rates.items() if s is not one.displacement]
@@ -251,7 +252,10 @@ class _Reducer:
         self.unknowns = [(self._in_state(residual), symbol) for residual, symbol in (*velocities, *self.others)]
 
     def _restarts(self) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
-        """Variables solved for after a jump, with their balances; `unknowns` first; empty without massless contacts."""
+        """Variables solved for after a jump, with their balances, the `unknowns` first.
+
+        Empty without massless contacts.
+        """
         if not self.light:
             return ()
         frictions = {contact.friction for contact in self.model.contacts}
@@ -281,7 +285,7 @@ class _Reducer:
         return self.model.steady[self.model.inputs["load_velocity"]]
 
     def _independent(self) -> list[Coordinate]:
-        """Coordinates whose displacement is not a function of others."""
+        """Coordinates whose displacement is not a function of other displacements."""
         return [one for one in self.model.coordinates if one.displacement not in self.found]
 
     def _eliminated_memories(self, light: list[int], eliminate: tuple[int | None, ...]) -> Replacements:
@@ -308,7 +312,7 @@ class _Reducer:
         return {symbol: sp.expand_mul(sp.Add(*terms))}  # expanded, so that ln σ cancels
 
     def _in_state(self, expression: sp.Expr) -> sp.Expr:
-        """Expression as a function of state, inputs and unknowns."""
+        """The expression as a function of state, inputs and unknowns."""
         if self.eliminated:
             expression = replaced(expression, self.eliminated)
         return replaced(replaced(self.inlined(expression), self.accelerations), self.closed)

@@ -169,7 +169,7 @@ class Reduction(HasCache):
         return Unknowns(self.unknowns, self.residuals)
 
     def derivative(self, expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
-        """Derivative of an expression, with the unknowns following the solution of their equations."""
+        """Total derivative of an expression: the unknowns follow the solution of their equations."""
         return self.solved.along(expression, variable)
 
     def jacobian(self) -> list[list[sp.Expr]]:
@@ -225,7 +225,7 @@ class Unknowns:
         return derivative(expression, variable) + self.followed(expression, own)
 
     def _moves(self, expression: sp.Expr, variable: sp.Symbol) -> bool:
-        """True if a variable is in an expression, or in the residuals of unknowns that are."""
+        """True if an expression contains a variable, or contains unknowns whose residuals contain the variable."""
         own = symbols_of(expression)
         return variable in own or (variable in self._causes and not own.isdisjoint(self.symbols))
 
@@ -249,7 +249,8 @@ class Unknowns:
 
     @cached_property
     def _factors(self) -> tuple[list[tuple[int, list[sp.Expr]]], list[tuple[int, int, sp.Expr]]]:
-        """LU factors: equations with rows of the upper triangle; steps (i, k, f), equation i minus f times k."""
+        """LU factors: rows of the upper triangle with the number of their equation, and steps (i, k, f): equation i
+        minus f times k."""
         rows, factors = list(enumerate(map(list, self.matrix))), []
         for k in range(len(rows)):
             pivot = next((i for i in range(k, len(rows)) if rows[i][1][k] != 0), None)

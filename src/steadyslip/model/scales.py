@@ -21,9 +21,11 @@ _LEAST_DIRECT_SHARE = 1e-7  # lower bound of the direct effect in scales, relati
 
 @cached
 def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping[str, Any], tuple[Any, ...]]:
-    """Typical size of each state variable, by name, and of each unknown of `Reduction.searched` (at least one value).
+    """Typical size of each state variable, by name, and of each unknown of `Reduction.searched` (or one value if there
+    is none).
 
-    SI units, arrays over the point. The size is the change for one e-fold of velocity, or a natural slip distance.
+    Sizes are in SI units, arrays of the point's shape: the change for one e-fold of velocity, or a natural slip
+    distance.
     """
     speeds = [np.asarray(speed, dtype=float) for speed in slip_rates(point)]
     with np.errstate(all="ignore"):
@@ -37,9 +39,11 @@ def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping
 
 
 def memory_scales(point: OperatingPoint) -> dict[str, float]:
-    """Change of each memory variable of a slider for one e-fold of velocity, by name; 1 if friction ignores it.
+    """Change of each memory variable of a slider for one e-fold of velocity, by name.
 
-    Unlike `natural_scales`, it is not reduced where the steady value of the variable happens to be near 0.
+    1 if friction does not depend on it.
+
+    Unlike `natural_scales`, the result does not depend on the steady value of the variable.
     """
     found = weights(point, 0)
     direct = direct_effect_scale(found, np.where)
@@ -117,8 +121,9 @@ def machine_scales(
 ) -> tuple[dict[str, Any], tuple[Any, ...]]:
     """Natural scales of a machine in plain arithmetic, for arrays or nodes of a generated program.
 
-    The scale of a displacement is the smallest that gives a natural slip distance at a contact; without contact, the
-    motion within the shortest natural time; at rest, the stretch of its springs by the largest friction force.
+    The scale of a displacement is the least displacement that makes a natural slip distance at a contact; for a
+    coordinate without contact, the motion within the shortest natural time; for one at rest, the stretch of its springs
+    by the largest friction force.
 
     Parameters
     ----------
@@ -190,13 +195,13 @@ def shortest_time(scales: Mapping[str, Any], choose: Choose = np.where) -> Any:
 
 
 def direct_effect_scale(found: Weights, choose: Choose) -> Any:
-    """Direct effect used for scaling (Pa): bounded below relative to the normal stress, 0 if there is none."""
+    """Direct effect (Pa) used for scaling, at least a share of the normal stress; 0 if there is no direct effect."""
     direct, least = abs(found.direct), _LEAST_DIRECT_SHARE * abs(found.stress)
     return choose(direct > 0, choose(direct > least, direct, least), 0.0)
 
 
 def _is_speed(past: Variable) -> bool:
-    """True for a variable of a late slip rate, False for one of a late force."""
+    """True for a variable of a delayed slip rate, False for a variable of a delayed force."""
     return past.unit == "m/s"
 
 

@@ -54,7 +54,10 @@ def _velocity_variable(reduction: Reduction, index: int) -> ArrayFunction:
 
 @cached
 def slip_rates_at(model: Model) -> ArrayFunction:
-    """Array function of slip rates from velocities of the coordinates, with the load point at its steady velocity."""
+    """Array function that returns slip rates for velocities of the coordinates.
+
+    The load point has its steady velocity.
+    """
     steady = {model.inputs["load_velocity"]: model.steady[model.inputs["load_velocity"]]}
     slips = (model.definitions.get(contact.velocity, contact.velocity) for contact in model.contacts)
     return model.function([e.xreplace(steady) for e in slips], *(one.velocity for one in model.coordinates))
@@ -83,7 +86,10 @@ def _drive_force(model: Model) -> ArrayFunction:
 
 @cached
 def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
-    """Array function of a massless slider's balance and its slope in one memory variable; True if linear in it."""
+    """Array function of a massless slider's balance and its derivative by one memory variable.
+
+    True if the balance is linear in it.
+    """
     model = reduction.model
     memory = [item.symbol for item in model.memory]
     ((w, balance),) = reduction.restarts
@@ -99,10 +105,10 @@ def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
 def initial_values(
     reduction: Reduction, point: OperatingPoint, given: Mapping[str, Any], free: Any = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Initial values of the continuous variables, (rigs, variables), and slip rate of the first contact, (rigs,).
+    """Initial values of the continuous variables, (rigs, variables), and of the first contact's slip rate, (rigs,).
 
     Variables that are not given have their steady values. Without mass, a velocity can be given only if at least one
-    memory variable is not: the first memory variable not given follows from the balance of forces.
+    memory variable is not given: the first of these follows from the balance of forces.
 
     Parameters
     ----------
@@ -210,7 +216,7 @@ def _matching_memory(reduction: Reduction, point: OperatingPoint, x: Any, v: Any
             residual, slope = point.evaluate(function, x, v, *current)
             change = residual / slope
         current[index] = current[index] - change
-        if not np.any(np.abs(change) > 1e-15 * (1 + np.abs(current[index]))):  # four roundings
+        if not np.any(np.abs(change) > 1e-15 * (1 + np.abs(current[index]))):  # about four rounding errors
             break
     return current[index]
 
@@ -237,5 +243,6 @@ def _steady_unknowns(reduction: Reduction) -> ArrayFunction:
 
 @cached
 def restored_of(reduction: Reduction) -> ArrayFunction:
-    """Array function of the continuous variables from state and inputs, to start a kernel at any state."""
+    """Array function that returns the continuous variables for a state and inputs, so that a run can start at any
+    state."""
     return reduction.model.function(reduction.restored, *reduction.state, *reduction.inputs)

@@ -53,7 +53,7 @@ class Statics:
 
 
 def row_of(row: Shares, values: Mapping[str, Any]) -> sp.Expr:
-    """Value of a row for given values of coordinates; coordinates without a value count as zero."""
+    """Sum of `values` of coordinates times their coefficients in `row`; coordinates without a value count as zero."""
     return sp.Add(*(sp.sympify(coefficient) * values[name] for name, coefficient in row.items() if name in values))
 
 
@@ -99,7 +99,8 @@ def _balances(
     mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, NormalStress],
     places: Mapping[str, sp.Expr], held: sp.Expr, tensions: Mapping[int, sp.Expr],
 ) -> list[sp.Expr]:  # fmt: skip
-    """Residuals of the statics: error of the controller, if there is one, then force on every coordinate."""
+    """Residuals of the statics: the controller's error, if there is a controller, then the force on every
+    coordinate."""
     integral = mechanism.integral
     speeds = {one.name: sp.sympify(one.speed) for one in mechanism.coordinates} | {LOAD_POINT: mechanism.velocity}
     equations = [] if integral is None else [row_of(integral.senses, places)]
@@ -160,7 +161,7 @@ def _with_symbolic_forces(
 
 
 def _solve(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr] | None:
-    """Exact solution of linear equations in lowest terms; None if it is too long."""
+    """Exact solution of linear equations, in lowest terms; None if it would be too long."""
     placeholders = Placeholders()
     nothing = dict.fromkeys(unknowns, sp.Integer(0))
     matrix = [[placeholders.polynomial(derivative(sp.expand(e), u)) for u in unknowns] for e in equations]
@@ -176,7 +177,7 @@ def _solve(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr]
         DomainMatrix([[ring.from_sympy(one) for one in row] for row in rows], (len(rows), len(rows[0])), ring)
         for rows in (matrix, right)
     )
-    try:  # polynomials over one denominator: cancelling quotients at every step takes a thousand times as long
+    try:  # as polynomials over a common denominator; cancelling quotients at every step takes a thousand times as long
         tops, below = table.solve_den(known, method="rref")
     except (DMNonInvertibleMatrixError, ZeroDivisionError):
         raise NotAvailable(UNHELD) from None

@@ -25,14 +25,16 @@ Arguments = tuple[Any, ...]
 GRID = np.geomspace(1e-12, 1e18, 6001)  # Pa; grid for sign changes, 200 points per decade; chosen by trial
 ROOT_TOLERANCE = 1e-6  # residual relative to the stress; above it a change of sign is a pole and not a root
 _NEARLY_REAL = 1e-9  # largest relative imaginary part of an eigenvalue that counts as real; chosen by trial
-_BATCH = 64  # rigs searched at once, so that arrays stay in the processor's cache
-MAX_BENDS = 8  # most absolute values |e| in coupled equations; each doubles the number of linear systems to solve
+_BATCH = 64  # number of rigs whose roots are searched together, so that arrays stay in the processor's cache
+MAX_BENDS = 8  # most absolute values |e| in coupled equations; each |e| doubles the number of linear systems to solve
 _HALVINGS = 48  # bisection steps: a cell of `GRID` is 0.012 of its stress wide, and 0.012 / 2**48 is below rounding
 
 
 @dataclass(frozen=True)
 class SteadyEquation:
-    """Equation of the steady normal stress of one contact; in closed form if the contact is linear in the stresses.
+    """Equation of the steady normal stress of one contact.
+
+    It has a closed form if the contact is linear in the stresses.
 
     ``parts(*arguments)`` returns (load, g0, g1), where load is σss itself if the rig gives it (`given`); `sigma` and
     `slope` are the expressions of σss and g1. Without a closed form only the function `residual` is set.
@@ -274,7 +276,8 @@ def _curved(name: str) -> NotAvailable:
 
 
 def _straightened(model: Model, unknowns: Sequence[sp.Symbol]) -> tuple[list[sp.Expr], Bends]:
-    """Expressions of the steady normal stresses with s e for each |e| that depends on the unknowns; and `Bends`."""
+    """Expressions of the steady normal stresses, with s e in place of each |e| that depends on the unknowns, and the
+    `Bends`."""
     laws = [contact.steady_stress for contact in model.contacts]
     wanted = set(unknowns)
     found = {atom: None for law in laws for atom in sorted(law.atoms(sp.Abs), key=str) if atom.free_symbols & wanted}
@@ -335,9 +338,11 @@ def steady_stresses(model: Model, arguments: Arguments, branch: int) -> tuple[An
 
 
 def steady_stress(model: Model, arguments: Arguments, branch: int, place: int) -> Any:
-    """Steady normal stress σss (Pa) of one contact over the varied parameters; NaN without steady sliding.
+    """Steady normal stress σss (Pa) of the contact with index `place` over the varied parameters.
 
-    If there are several solutions, the one with index `branch`.
+    NaN without steady sliding.
+
+    Of several solutions, the solution with index `branch` by rising stress is returned.
     """
     equation = steady_equation(model, place)
     if equation.parts is None:
@@ -384,7 +389,7 @@ def _by_search(equation: SteadyEquation, arguments: Arguments, branch: int) -> A
 
 
 def _search(residual: Callable[..., Any], arguments: list[Array]) -> list[list[float]]:
-    """Roots of the residual (Pa) of each rig over thirty decades of stress, rising.
+    """Roots of the residual (Pa) of each rig over thirty decades of stress, in rising order.
 
     Brackets are sign changes on `GRID`; all are bisected at once to rounding.
     """

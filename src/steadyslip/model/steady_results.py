@@ -1,4 +1,4 @@
-"""States of steady sliding as results, and the messages where there is none."""
+"""States of steady sliding as results, and the messages for rigs without steady sliding."""
 
 from __future__ import annotations
 

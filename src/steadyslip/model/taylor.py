@@ -45,7 +45,7 @@ class System:
     entries : tuple of (Index, ...)
         Indices of the nonzero derivatives of orders one, two and three.
     expressions : tuple of sympy.Expr
-        These derivatives in steady sliding, in the same order.
+        The derivatives in steady sliding, in the order of `entries`.
     function : ArrayFunction
         Array function of the expressions.
     late : tuple of (int, int, int)
@@ -117,7 +117,7 @@ class Taylor:
         Jacobian of F and its rounding errors, which include rounding of the rig's parameters.
     second, third : list of Entry
     mass : ndarray (n,)
-        Ones for equations with a time derivative, zeros for the others.
+        1 for equations with a time derivative, 0 for equations without.
     delays : ndarray (m, d)
         Delays of the model, s.
     """

@@ -37,7 +37,8 @@ def _column(name: str, size: int) -> Column:
 
 
 def _extended(reduction: Reduction, free: tuple[Column, ...], driven: tuple[Column, ...]) -> Reduction:
-    """Add columns with the linearised equations: `free` ones, and ones `driven` by changes of constants."""
+    """The Reduction with further columns that obey the linearised equations: `free` columns, and columns `driven` by
+    changes of constants."""
     jacobian = reduction.jacobian()
     columns = free + driven
     rates = tuple(

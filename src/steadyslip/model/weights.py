@@ -116,7 +116,8 @@ def _slip_rates(model: Model) -> ArrayFunction:
 
 @cached
 def eliminable(point: OperatingPoint) -> int | tuple[int | None, ...] | None:
-    """Index of the memory variable to eliminate: of those that can be, the one with the largest effect on friction.
+    """Index of the memory variable to be eliminated: of those that can be, the variable with the largest effect on
+    friction.
 
     None if no variable can be eliminated, or if its effect is too small in some rig. For a machine, a tuple with one
     index or None for each contact.

@@ -307,8 +307,6 @@ class _Known:
         """True if every mode in the band is wider than the spacing of frequencies.
 
         A fit to a single noisy value is narrower.
-
-        A fit to a single noisy value is narrower.
         """
         inside = poles[poles.imag < self.omega[-1]]
         at = np.clip(np.searchsorted(self.omega, inside.imag), 1, len(self.omega) - 1)

@@ -38,8 +38,6 @@ def _basis(s: ComplexArray, poles: ComplexArray, constant: bool) -> ComplexArray
     """Partial fractions (p, 2 k + 1) at s.
 
     For each pole the factors of the residue's real and imaginary part; last a constant 1.
-
-    Last a constant of 1.
     """
     near, far = 1 / (s[:, None] - poles), 1 / (s[:, None] - poles.conj())
     pairs = np.stack([near + far, 1j * (near - far)], axis=-1).reshape(len(s), -1)

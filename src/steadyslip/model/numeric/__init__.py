@@ -1,6 +1,6 @@
 """Machines of any size in numbers: matrices and contacts, steady sliding, eigenvalues, edges; no machine-wide symbols.
 
-Knows the laws by their expressions, contact by contact; knows nothing of the symbolic Model of a machine.
+Laws enter by their expressions, contact by contact; the symbolic Model of a machine is not used.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 
 _WRITTEN_OUT = 18
-"""States, each of first order, up to which the polynomial of a machine is written out in symbols within some ten
-seconds: 8 blocks in a row with one contact have 17, and with 9 the time doubles for each block more."""
+"""Largest number of first-order states for which the polynomial of a machine is written out in symbols, in some ten
+seconds. Eight blocks in a row with one contact have 17 states; with each further block the time doubles."""
 MEASURED = (
     "a structure given by its measured response has no equations; `analyze` gives its verdict and edges, in Python "
     "also boundary and margins, and identified_modes its modes. Describe it by matrices or modes for more"
@@ -44,12 +44,12 @@ def by_matrices(rig: Rig) -> TypeGuard[Machine]:
 
 
 def in_numbers(machine: Machine) -> bool:
-    """True for a machine whose matrices can be had: it slides, without delays and measured responses."""
+    """True for a machine of which matrices can be made: it slides, and has no delays and no measured response."""
     return not (machine.holds or _delayed(machine) or has_response(machine))
 
 
 def _states(machine: Machine) -> int:
-    """Number of displacements, velocities and states of laws."""
+    """Number of displacements, velocities and states of laws in a machine."""
     places = sum(2 if body.lifts else 1 for body in machine.bodies.values())
     own = (len(one.friction.memory()) + len(one.contact.memory()) for one in machine.contacts.values())
     return 2 * places + sum(own)

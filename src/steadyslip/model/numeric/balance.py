@@ -1,4 +1,4 @@
-"""Steady sliding of a machine given by matrices: forces in balance at every contact's own slip rate."""
+"""Steady sliding of a machine given by matrices: displacements and stresses at which all forces balance."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from steadyslip.core.arrays import Array
 from steadyslip.model.numeric.contact_laws import SteadyNumbers
 from steadyslip.model.numeric.machine_matrices import MachineMatrices, Site
 
-_STEPS = 60  # of Newton's method; laws that are linear in the stresses take two
-_CONVERGED = 1e-13  # change of the stresses relative to them, some hundred units in the last place
-_STALLED = 1e-6  # change that no longer falls: rounding, of stresses far smaller than the forces that balance
-_SHRINK = 0.1  # smallest share of a stress that one step leaves
-_LARGE = 64  # unknowns from which one system of equations after the other is faster than all together
-_FREE = 1e-13  # pivot of the balances, relative to the largest, below which they leave a body free
+_STEPS = 60  # most steps of Newton's method; two suffice if laws are linear in the stresses
+_CONVERGED = 1e-13  # relative change of the stresses at which Newton's method has converged: some hundred roundings
+_STALLED = 1e-6  # a smaller relative change counts as rounding if it no longer falls: stresses far below the forces
+_SHRINK = 0.1  # a step reduces a stress at most to this share of its value
+_LARGE = 64  # number of unknowns above which solving systems of equations one by one is faster than all together
+_FREE = 1e-13  # relative size of a pivot of the balances below which nothing holds some body in its place
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,14 +29,14 @@ class Balance:
     sigma, tau : ndarray (..., contacts)
         Stresses (Pa); NaN without steady sliding.
     displacement : ndarray (..., n)
-        Of the coordinates that are not left out.
+        Displacements of the coordinates that are not left out (`left_out`).
     integral : ndarray (...)
     gain : ndarray (...)
         Largest factor by which friction raises itself through the normal stresses; >= 1 is lock-up.
     wanted : ndarray (..., contacts)
         Normal stresses that would balance the forces, negative ones too.
     held, settled : ndarray of bool (...)
-        False where the balances leave a body free, and where Newton's method came to no end.
+        `held` is False where nothing holds a body in its place, `settled` where Newton's method did not converge.
     """
 
     sigma: Array
@@ -50,7 +50,10 @@ class Balance:
 
     @property
     def problem(self) -> str:
-        """Reason why steady sliding of a single machine was not found; empty if it was found or does not exist."""
+        """Reason why steady sliding of a single machine was not found.
+
+        Empty if it was found, or if it does not exist.
+        """
         if not self.held:
             return "nothing holds some body of this machine in its place; give every body a link"
         return (
@@ -61,7 +64,7 @@ class Balance:
 
     @property
     def exists(self) -> NDArray[np.bool_]:
-        """True with steady sliding, (...)."""
+        """True (...) where steady sliding exists."""
         there = self.held & self.settled & (self.gain < 1)
         return np.asarray(there & np.all(np.isfinite(self.sigma) & (self.sigma > 0), axis=-1))
 
@@ -75,18 +78,18 @@ def state_of(site: Site, found: Balance, i: int, speeds: Array) -> tuple[Any, ..
 
 
 def spring_of(site: Site, displacement: Array, integral: Array, speeds: Array) -> Array:
-    """T (Pa) of a contact in steady sliding, (...)."""
+    """Pull T (Pa) on the body of a contact in steady sliding, (...)."""
     pulled = np.sum(site.pull * displacement + site.pull_rate * speeds, axis=-1)
     return np.asarray(pulled + site.pull_integral * integral + site.pull_moving)
 
 
 def balances(machine: MachineMatrices) -> Balance:
-    """Steady sliding of one machine or of several; `held` and `settled` are false where it was not found."""
+    """Steady sliding of one machine or of several; `held` or `settled` is False where it was not found."""
     return _Newton(machine).solve()
 
 
 class _Newton:
-    """Newton's method in displacements, integral of the controller and normal stresses, in this order."""
+    """Newton's method for displacements, the controller's integral and normal stresses, in this order."""
 
     def __init__(self, machine: MachineMatrices) -> None:
         self.machine, self.sites = machine, machine.sites
@@ -95,7 +98,7 @@ class _Newton:
         self.statics = self._statics()
 
     def _statics(self) -> Array:
-        """Matrix of the balances and of the controller's integral, without contacts."""
+        """Matrix of the balances and of the controller's integral, without the forces of contacts."""
         n, own = self.size, self.machine
         found = np.zeros((*own.several, n + self.more, n + self.more))
         found[..., :n, :n] = own.stiffness - own.followed
@@ -119,7 +122,7 @@ class _Newton:
             still = (change <= _CONVERGED) | (change <= _STALLED) & (change >= 0.5 * last)
             settled |= open_ & np.all(wanted > 0, axis=-1) & still
             last = change
-            if step:  # pressed against zero twice: the contact lifts
+            if step:  # a stress that is reduced towards zero in two steps: the contact lifts off
                 pressed = np.all((wanted > 0) | (before <= _SHRINK), axis=-1)
                 lifted |= open_ & ~settled & np.any(wanted <= 0, axis=-1) & pressed
             if np.all(settled | lifted | ~held):
@@ -181,14 +184,16 @@ class _Newton:
         return matrix, right
 
     def _pressing(self, site: Site, by_spring: Any, by_distance: Any) -> tuple[Array, Any]:
-        """Slopes of the normal stress with displacements (..., n) and with the integral of a controller (...)."""
+        """Derivatives of the normal stress with respect to displacements, (..., n), and to a controller's integral,
+        (...)."""
         by_place = _times(by_spring, site.pull) + _times(by_distance, site.apart)
         return by_place, by_spring * site.pull_integral
 
     def _gain(self, unknown: Array) -> Array:
         """Largest real factor by which friction raises itself through normal stresses, (...); −inf if none is real.
 
-        The stress of a contact that is given does not follow the friction of others, only its own (theory 4).
+        A given steady normal stress does not follow the friction of other contacts, only that of the contact itself
+        (theory 4).
         """
         n, start = self.size, self.size + self.more
         without = np.zeros((*unknown.shape, unknown.shape[-1]))
@@ -226,7 +231,7 @@ def _times(factor: Any, row: Array) -> Array:
 
 
 def _solved(matrix: Array, right: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Solutions of linear equations, and where there are any.
+    """Solutions of linear equations, and True where a solution exists.
 
     Rows and columns of very different size are balanced first.
     """
@@ -255,15 +260,16 @@ def _flat(rows: Array) -> Array:
 
 
 def _solved_by_factors(matrix: Array, right: Array) -> Array:
-    """Solution of one system of equations; NaN where an estimate of the condition, of factors, finds it singular.
+    """Solution of one system of equations; NaN if it is singular by an estimate of its condition from LU factors.
 
-    Singular values would take ten times as long for hundreds of unknowns.
+    The condition from singular values would take ten times as long for hundreds of unknowns.
     """
     from scipy.linalg import lapack  # slow to import
 
     factors, pivots, _ = lapack.dgetrf(matrix)
     inverse_condition, _ = lapack.dgecon(factors, np.max(np.sum(np.abs(matrix), axis=0)))
-    if not inverse_condition * len(matrix) >= _FREE:  # in sums of entries, which are up to n times the singular values
+    # norms are sums of entries here, up to n times the singular values
+    if not inverse_condition * len(matrix) >= _FREE:
         return np.full(len(matrix), np.nan)
     found, _ = lapack.dgetrs(factors, pivots, right)
     return np.asarray(found)

@@ -17,22 +17,24 @@ from numpy.typing import NDArray
 from steadyslip.core.arrays import Array
 from steadyslip.model.numeric.pencil import ComplexArray, StatePencil
 
-_RANK = 1e-12  # size relative to the largest below which a direction of a change is rounding
+_RANK = 1e-12  # relative singular value below which a direction of a change is rounding error
 _LINEAR = 1e-9  # relative difference of slopes that counts as rounding of assembly and elimination
-_SKETCH = 24  # random directions in which changes are looked at; a parameter of a contact or link changes fewer rows
-_AROUND = (-3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0)  # places at each pole, in units of its distance from the axis
-_PER_DECADE = 24  # places between poles
-_BEYOND = 1e3  # factor beyond the slowest and fastest root up to which places are as dense
+_SKETCH = 24  # number of random vectors by which the rank of a change is found; a contact or link has a smaller rank
+_AROUND = (-3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0)  # frequencies near a pole, in units of its distance from the axis
+_PER_DECADE = 24  # number of frequencies per decade, besides those near poles
+_BEYOND = 1e3  # factor beyond the slowest and fastest root up to which frequencies are as dense
 _FAR = 1e12  # factor up to which frequencies are followed: a changed machine may be that much slower or faster
-_SPARSE = 6  # places per decade there
-_TURN = 1.2  # rad; largest change of the argument between two places that counts as followed
-_ROUNDS = 24  # of halving between places until the argument is followed
-_MORE, _SOME = 4, 64  # times as many steep places as at first, or as some: made by rounding, as halving finds ever more
+_SPARSE = 6  # number of frequencies per decade from `_BEYOND` to `_FAR`
+_TURN = 1.2  # rad; between two frequencies the argument may change by this much; if by more, one is added between
+_ROUNDS = 24  # most halvings of the interval between two frequencies until the argument changes little enough
+# If halving leads to more than 4 times as many intervals with large changes of the argument as at first (or as 64),
+# the changes are due to rounding.
+_MORE, _SOME = 4, 64
 
 
 @dataclass(frozen=True, eq=False)
 class LowRankChange:
-    """Changes of a pencil in a few directions: s E − A + U (s Be − Ba) Vᵀ.
+    """A change of the pencil s E − A by a matrix of low rank: s E − A + U (s Be − Ba) Vᵀ.
 
     Attributes
     ----------
@@ -49,26 +51,27 @@ class LowRankChange:
 
     @property
     def is_wide(self) -> bool:
-        """True if the directions are perhaps more than were found, as for what damps or turns a whole structure."""
+        """True if the rank may be larger than was found, as for a parameter that damps or turns a whole structure."""
         return bool(max(self.into.shape[1], self.out.shape[1]) > _SKETCH)
 
     def core(self, e: Array, a: Array, at: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Be and Ba (k, m) of another pencil whose rows and columns at places `at` (K,) are `e` and `a` (K, K)."""
+        """Be and Ba (k, m) of a pencil that differs only in rows and columns `at` (K,), where it has `e` and `a` (K,
+        K)."""
         both = np.ix_(at, at)
         before, after = self.rows[at].T, self.columns[at]
         return before @ (e - self.own.e[both]) @ after, before @ (a - self.own.a[both]) @ after
 
     def core_of(self, other: StatePencil) -> tuple[Array, Array]:
-        """Be and Ba (k, m) of another pencil."""
+        """Be and Ba (k, m) of the change that leads to another pencil."""
         return self.core(other.e, other.a, np.arange(len(other.a)))
 
     def response(self, omega: Array) -> ComplexArray:
-        """Vᵀ (iω E − A)⁻¹ U at frequencies (p,), (p, m, k)."""
+        """Response Vᵀ (iω E − A)⁻¹ U at frequencies ω (p,), (p, m, k)."""
         return self._resolvent(1j * omega)
 
     @cached_property
     def static_response(self) -> Array:
-        """The response to constant forces, (m, k)."""
+        """The response at frequency zero, (m, k)."""
         return np.asarray(self._resolvent(np.zeros(1, dtype=complex))[0].real)
 
     @cached_property
@@ -77,7 +80,7 @@ class LowRankChange:
 
     def ratio(self, omega: Array, response: ComplexArray, core: tuple[Array, Array]) -> ComplexArray:
         """Δ at frequencies (p,)."""
-        if response.shape[1] > response.shape[2]:  # det(1 + R B) = det(1 + Rᵀ Bᵀ), the smaller one
+        if response.shape[1] > response.shape[2]:  # det(1 + R B) = det(1 + Rᵀ Bᵀ); the smaller matrix is used
             response, core = np.swapaxes(response, 1, 2), (core[0].T, core[1].T)
         flat, size = response.reshape(-1, response.shape[2]), response.shape[1]
         by_rate, by_place = ((flat @ one).reshape(-1, size, size) for one in core)  # faster than one by one
@@ -86,7 +89,7 @@ class LowRankChange:
 
 
 def change_between(own: StatePencil, others: list[StatePencil]) -> LowRankChange | None:
-    """Directions in which other pencils differ from one; None if they do not differ."""
+    """Low-rank change in which pencils differ from the pencil `own`; None if they do not differ."""
     rows, columns = own.scale
     chance = np.random.default_rng(0)
     size = len(own.e)
@@ -111,7 +114,7 @@ def _directions(sketch: Array) -> Array:
 
 
 def frequencies(own: StatePencil, further: tuple[float, ...] = ()) -> Array:
-    """Frequencies (rad/s) at which the response of a machine is followed: dense at its poles."""
+    """Frequencies (rad/s) at which the response of a machine is computed; they are dense near its poles."""
     poles = own.eigenvalues
     size = np.abs(poles[np.abs(poles) > 0])
     sizes = np.append(size, further) if len(size) or further else np.ones(1)
@@ -125,7 +128,7 @@ def frequencies(own: StatePencil, further: tuple[float, ...] = ()) -> Array:
 
 
 class Turns:
-    """Change in the number of growing eigenvalues under changes of one parameter."""
+    """Change in the number of growing eigenvalues by a parameter, from turns of Δ around zero."""
 
     def __init__(self, change: LowRankChange) -> None:
         self.change = change
@@ -135,7 +138,7 @@ class Turns:
     def more_growing(self, core: tuple[Array, Array]) -> int | None:
         """Number of growing roots after a change (Be, Ba) minus those before; None if a root is too near the axis.
 
-        Frequencies that it needs besides are kept: the next one along a parameter mostly needs the same.
+        Frequencies that are added for one value of the parameter are kept, as the next value mostly needs the same.
         """
         ratio, most = self.change.ratio(self.omega, self.response, core), 0
         for _ in range(_ROUNDS):
@@ -161,7 +164,7 @@ class Turns:
         return [float(one) for one in self.omega[inner[np.argsort(size[inner])[:count]]]]
 
     def _ends(self, core: tuple[Array, Array], ratio: ComplexArray) -> float:
-        """Turns (rad) below the first and beyond the last frequency, where Δ is nearly real."""
+        """Turns (rad) of Δ below the first frequency and above the last, where Δ is nearly real."""
 
         def to_axis(one: complex) -> float:
             angle = float(np.angle(one))
@@ -173,7 +176,7 @@ class Turns:
 def rank_one(change: LowRankChange, steps: list[float], others: list[StatePencil]) -> tuple[Array, Array] | None:
     """Be and Ba for a unit of the parameter if all changes are proportional to it and of rank one; None otherwise.
 
-    `steps` are the changes of the parameter, from its own value, that lead to `others`.
+    `steps` are the changes of the parameter, from its value in the machine, that lead to the pencils `others`.
     """
     cores = [[own / step for own in change.core_of(other)] for step, other in zip(steps, others, strict=True)]
     units = []
@@ -193,7 +196,7 @@ def _rank(matrix: Array) -> int:
 
 
 def scalar_response(omega: Array, response: ComplexArray, unit: tuple[Array, Array]) -> ComplexArray:
-    """h(iω) of 1 + θ h = Δ for a change of rank one, at frequencies (p,)."""
+    """h(iω) at frequencies ω (p,) for a change of rank one, of which Δ = 1 + θ h."""
     by = 1j * omega[:, None, None] * unit[0] - unit[1]
     found: ComplexArray = np.trace(response @ by, axis1=1, axis2=2)
     return found
@@ -202,12 +205,12 @@ def scalar_response(omega: Array, response: ComplexArray, unit: tuple[Array, Arr
 def real_crossings(change: LowRankChange, turns: Turns, unit: tuple[Array, Array]) -> tuple[Array, Array]:
     """All steps θ at which a root lies on the imaginary axis, 1 + θ h(iω) = 0, and their frequencies (rad/s).
 
-    These are the frequencies where h is real: changes of sign of its imaginary part, narrowed to rounding. Dips of that
-    part towards zero between two places are looked into.
+    h is real at these frequencies: its imaginary part changes sign, which is narrowed to rounding. Where the imaginary
+    part has a minimum close to zero between two frequencies, further frequencies are added.
     """
     omega, values = turns.omega, scalar_response(turns.omega, turns.response, unit)
     extra = _dips(omega, values.imag)
-    for _ in range(4):  # rounds of looking into dips, each eight times finer
+    for _ in range(4):  # rounds of adding frequencies at minima, each eight times denser
         if not extra.size:
             break
         fresh = scalar_response(extra, change.response(extra), unit)
@@ -217,7 +220,7 @@ def real_crossings(change: LowRankChange, turns: Turns, unit: tuple[Array, Array
     at = np.flatnonzero(np.sign(values.imag[1:]) * np.sign(values.imag[:-1]) < 0)
     low, high = omega[at], omega[at + 1]
     below = values.imag[at]
-    for _ in range(60):  # halvings to rounding; secants would stick at the poles
+    for _ in range(60):  # halvings down to rounding; the secant method would stick at poles of h
         middle = 0.5 * (low + high)
         now = scalar_response(middle, change.response(middle), unit).imag
         same = np.sign(now) == np.sign(below)
@@ -233,7 +236,7 @@ def real_crossings(change: LowRankChange, turns: Turns, unit: tuple[Array, Array
 
 
 def _dips(omega: Array, imaginary: Array) -> Array:
-    """Places inside brackets where the size of the imaginary part has a minimum without a change of sign."""
+    """Frequencies around minima of the size of the imaginary part at which it does not change sign."""
     size = np.abs(imaginary)
     inner = (size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])
     alike = (np.sign(imaginary[:-2]) == np.sign(imaginary[1:-1])) & (np.sign(imaginary[2:]) == np.sign(imaginary[1:-1]))

@@ -1,4 +1,4 @@
-"""Numbers of one contact's laws: steady stresses, and slopes at steady sliding, from the laws' own expressions.
+"""Steady stresses of one contact, and derivatives at steady sliding, evaluated from the expressions of its laws.
 
 Compiled once for each pair of laws with the same structure, whatever machine they belong to.
 """
@@ -28,16 +28,19 @@ _SPRING_SS, _TAU_SS, _DISTANCE_SS, _STIFFNESS = inner_symbols("n_Tss n_tauss n_u
 
 @dataclass(frozen=True)
 class SteadyNumbers:
-    """Stresses (Pa) of a contact in steady sliding by its laws, and their slopes, float or (...) as their arguments.
+    """Stresses (Pa) of a contact in steady sliding by its laws, and their derivatives.
+
+    Shapes are those of the arguments.
 
     Attributes
     ----------
     friction, friction_by_stress
-        τss, and its slope with the normal stress.
+        τss, and its derivative with respect to the normal stress.
     pressed, by_spring, by_friction, by_distance
-        Normal stress by the contact law, and its slopes with T, τ and the distance of the surfaces.
+        Normal stress by the contact law, and its derivatives with respect to T, τ and the distance of the surfaces.
     coupled_by_spring, coupled_by_friction
-        Slopes with T and τ of what motion adds; they differ where the steady normal stress is given.
+        Derivatives with respect to T and τ of the part of the normal stress due to motion; these differ from
+        `by_spring` and `by_friction` if the steady normal stress is given.
     """
 
     friction: Any
@@ -52,18 +55,19 @@ class SteadyNumbers:
 
 @dataclass(frozen=True)
 class Slopes:
-    """Slopes of a contact's laws at steady sliding.
+    """Derivatives of a contact's laws at steady sliding.
 
     Attributes
     ----------
     strength : ndarray (..., 3 + m)
-        Of the friction stress with v, σ, τ and the m memory variables.
+        Derivatives of the friction stress with respect to v, σ, τ and the m memory variables.
     rates : ndarray (..., m, 3 + m)
-        Of the rates of the memory variables, with the same.
+        Derivatives of the rates of the memory variables, with respect to the same.
     normal : ndarray (..., 7 + p)
-        Of the normal stress with x, v, v̇, T, τ, distance, rate of the distance and the p states of the contact law.
+        Derivatives of the normal stress with respect to x, v, v̇, T, τ, the distance and its rate, and the p states of
+        the contact law.
     state_rates : ndarray (..., p, 7 + p)
-        Of the rates of these states, with the same.
+        Derivatives of the rates of these states, with respect to the same.
     """
 
     strength: Array
@@ -118,11 +122,11 @@ class ContactFunctions:
         )
 
     def steady(self, own: tuple[Any, ...], *at: Any) -> SteadyNumbers:
-        """Stresses at v, σ, T, τ, distance and stiffness; `own` are the laws' parameters by `numbers_of`."""
+        """Stresses at v, σ, T, τ, distance and stiffness; `own` has the laws' parameters from `numbers_of`."""
         return SteadyNumbers(*self._steady(*own, *at))
 
     def slopes(self, own: tuple[Any, ...], *at: Any) -> Slopes:
-        """Slopes at v, σ, T, τ, distance and stiffness."""
+        """Derivatives at v, σ, T, τ, distance and stiffness."""
         several = np.broadcast_shapes(*(np.shape(one) for one in (*own, *at)))
         found = np.stack([np.broadcast_to(one, several) for one in self._slopes(*own, *at)], axis=-1).astype(float)
         count = self._shapes[0][0] * self._shapes[0][1]
@@ -133,7 +137,7 @@ class ContactFunctions:
         return Slopes(slip[..., 0, :], slip[..., 1:, :], press[..., 0, :], press[..., 1:, :])
 
     def observed(self, own: tuple[Any, ...], v: float, sigma: float, tau: float) -> dict[str, float]:
-        """States of the laws in steady sliding, in the literature's form, by name."""
+        """States of the laws in steady sliding by name, as the literature defines them."""
         values = self._seen(*own, v, sigma, tau)
         return {name: float(value) + 0.0 for name, value in zip(self.seen, values, strict=True)}
 
@@ -144,7 +148,10 @@ def _at(slope: sp.Expr, still: dict[sp.Symbol, sp.Expr]) -> sp.Expr:
 
 
 def _with_symbols(law: Any, kind: str) -> tuple[Any, list[sp.Symbol]]:
-    """Copy of a law with symbols in place of its numbers, and these symbols; structural zeros stay zero."""
+    """Copy of a law with symbols in place of its numbers, and the symbols.
+
+    A number that is 0, and whose term is then left out, stays 0.
+    """
     symbols: dict[str, Any] = {}
     for place, (name, one) in enumerate(parameters(law).items()):
         if one.value is None:
@@ -156,13 +163,14 @@ def _with_symbols(law: Any, kind: str) -> tuple[Any, list[sp.Symbol]]:
 
 
 def numbers_of(friction: FrictionLaw, contact: ContactLaw) -> list[Any]:
-    """Values of the laws' parameters in the order of the compiled functions; numbers or expressions."""
+    """Values of the laws' parameters, numbers or expressions, in the order in which the compiled functions take
+    them."""
     given = [one for law in (friction, contact) for one in parameters(law).values() if one.value is not None]
     return [one.value for one in given if not (one.role.structural and one.value == 0)]
 
 
 class _Pair:
-    """Cache key that makes pairs of laws of the same structure equal."""
+    """Cache key of a pair of laws; keys of pairs with the same structure are equal."""
 
     def __init__(self, friction: FrictionLaw, contact: ContactLaw) -> None:
         self.friction, self.contact = friction, contact

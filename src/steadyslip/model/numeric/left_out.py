@@ -1,8 +1,8 @@
-"""Coordinates of structures that no link, contact or controller touches, left out of machines along a parameter.
+"""Coordinates of structures on which no link, contact or controller acts are left out where one parameter varies.
 
-A parameter of a link, contact or drive changes entries of the equations among touched coordinates alone. The others
-follow in steady sliding, K_ii q_i = f_i − K_ik q_k, and are added to the balances of those that are kept (k); the rows
-and columns of the kept ones in the equations of motion are what they are in the whole machine.
+A parameter of a link, contact or drive changes the equations of the other coordinates (k) only. In steady sliding the
+coordinates left out (i) follow from K_ii q_i = f_i − K_ik q_k, and their effect is added to the balances of the kept
+coordinates. In the equations of motion, rows and columns of kept coordinates are those of the whole machine.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from numpy.typing import NDArray
 from steadyslip.core.arrays import Array
 from steadyslip.machine.mechanism import Mechanism, StructurePart
 
-MANY = 64  # coordinates from which leaving them out costs less than carrying them along
-_REGULAR = 1e-10  # reciprocal condition of K_ii, made even, above which the rounding of what follows does not matter
+MANY = 64  # least number of coordinates that are left out; for fewer it would take longer than it saves
+_REGULAR = 1e-10  # least reciprocal condition of the scaled K_ii, for rounding errors of q_i to be negligible
 
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """Coordinates of the structures that are kept, and the effect of the others on steady sliding.
+    """Coordinates of structures that are kept, and the effect of the coordinates left out on steady sliding.
 
     Attributes
     ----------
     parts : tuple of StructurePart
-        Structures of the kept coordinates alone.
+        Structures with the kept coordinates only.
     kept : ndarray of int (k,)
-        Their places among all coordinates of the machine; bodies come first.
+        Indices of the kept coordinates among all coordinates of the machine; bodies come first.
     stiffness : ndarray (k, k)
-        K_ki K_ii⁻¹ K_ik, to be taken from the stiffness.
+        K_ki K_ii⁻¹ K_ik, to be subtracted from the stiffness.
     force, force_by_pace : ndarray (k,), (k, structures)
-        To be taken from the forces, and for every unit of the pace of a structure.
+        To be subtracted from the forces: a constant, and a column for each structure, per unit of its pace.
     """
 
     parts: tuple[StructurePart, ...]
@@ -46,17 +46,18 @@ class LeftOut:
         """The mechanism with its structures replaced by `parts`, one for one.
 
         Each takes over the pace of the structure it replaces.
-
-        Each takes over the pace of the structure it replaces.
         """
         pairs = zip(self.parts, mechanism.structures, strict=True)
         return replace(mechanism, structures=tuple(replace(part, pace=one.pace) for part, one in pairs))
 
 
 def left_out(mechanism: Mechanism, names: Set[str]) -> LeftOut | None:
-    """Part that can be left out of a mechanism without touched coordinates; None if that is little or nothing.
+    """Coordinates that can be left out of a mechanism, which is not touched there.
 
-    Holds for all mechanisms with its structures (`alike`) that touch none but coordinates with these `names`.
+    None if they are few or cannot be eliminated.
+
+    The result is valid for all mechanisms with equal structures (`alike`) in which links, contacts and controllers act
+    only on coordinates in `names`.
     """
     from scipy.linalg import block_diag  # slow to import
 
@@ -83,7 +84,7 @@ def left_out(mechanism: Mechanism, names: Set[str]) -> LeftOut | None:
 
 
 def touched(mechanism: Mechanism) -> set[str]:
-    """Coordinates in rows of links, contacts and controllers."""
+    """Names of the coordinates on which links, contacts and controllers act, or which they sense."""
     rows = [row for one in mechanism.elements for row in (one.acts, one.senses)]
     rows += [row for one in mechanism.contacts for row in (one.slip, one.separation)]
     if mechanism.integral is not None:
@@ -92,7 +93,7 @@ def touched(mechanism: Mechanism) -> set[str]:
 
 
 def alike(some: tuple[StructurePart, ...], others: tuple[StructurePart, ...]) -> bool:
-    """True if structures have the same matrices, forces and rigid motions."""
+    """True if all structures have the same matrices, forces and rigid motions."""
     pairs = zip(some, others, strict=True)
     names = ("mass", "damping", "stiffness", "force", "motion")
     arrays = ((getattr(one, name), getattr(two, name)) for one, two in pairs for name in names)
@@ -117,7 +118,7 @@ def _followed(part: StructurePart, outer: NDArray[np.bool_]) -> Array | None:
 
 
 def _among(part: StructurePart, chosen: NDArray[np.bool_]) -> StructurePart:
-    """The structure with some of its coordinates."""
+    """The structure with its `chosen` coordinates only."""
     both = np.ix_(chosen, chosen)
     return replace(
         part, coordinates=tuple(name for name, one in zip(part.coordinates, chosen, strict=True) if one),

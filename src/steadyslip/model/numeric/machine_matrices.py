@@ -36,19 +36,19 @@ _DELAYED = "a controller with a delay is not offered beside a structure given by
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """A contact among matrices: the friction stress τ acts against `slip`, the normal stress σ along `apart`.
+    """A contact in terms of matrices: the friction stress τ acts against `slip`, the normal stress σ along `apart`.
 
     Attributes
     ----------
     name : str
     slip, apart : ndarray (..., n)
-        Rows of slip and of the distance of the surfaces.
+        Coefficients of the displacements in the slip, and in the distance of the surfaces.
     area, velocity, stiffness : float or ndarray (...)
         Area, slip rate in steady sliding, and k, the stiffness between body and load point.
     pull, pull_rate : ndarray (..., n)
-        Rows of T with displacements and velocities.
+        Coefficients of displacements and of velocities in the pull T.
     pull_integral, pull_moving : float or ndarray (...)
-        T by the integral of a controller, and by the motion of the load point alone.
+        Pull T per unit of a controller's integral, and the part of T due to the motion of the load point.
     laws : ContactFunctions
     own : tuple of float or ndarray (...)
         Values of the laws' parameters.
@@ -77,16 +77,16 @@ class MachineMatrices:
     names : tuple of str
         Coordinates.
     mass, damping, stiffness : ndarray (..., n, n)
-        Bodies, links, controllers and structures. The damping has the gyroscopic matrices in it.
+        Contributions of bodies, links, controllers and structures. The damping includes gyroscopic matrices.
     force, speeds : ndarray (..., n)
-        Constant forces, those of dashpots at the moving load point included, and speeds in steady sliding.
+        Constant forces, including those of dashpots at the moving load point; speeds in steady sliding.
     integral_acts, integral_senses : ndarray (..., n)
         Integral action of a controller: force −acts · I with I' = senses · q; zero without one.
     sites : tuple of Site
     kept : ndarray of int (n,) or None
-        Places of these coordinates among all of the machine, if others are left out.
+        Indices of `names` among all coordinates of the machine, if some are left out.
     followed : ndarray (n, n) or ()
-        Stiffness that those left out take away in steady sliding.
+        Stiffness to be subtracted in steady sliding because of the coordinates left out.
     """
 
     names: tuple[str, ...]
@@ -103,7 +103,7 @@ class MachineMatrices:
 
     @property
     def integrates(self) -> bool:
-        """True with integral action."""
+        """True if a controller has integral action."""
         return bool(np.any(self.integral_acts != 0))
 
     @property
@@ -130,7 +130,7 @@ def assemble(machine: Machine) -> MachineMatrices:
 
 
 class VariedMachine:
-    """A machine as a function of one parameter, with the coordinates that it touches alone where these are few."""
+    """A machine as a function of one parameter; coordinates that it does not change are left out if they are many."""
 
     def __init__(self, machine: Machine, name: str) -> None:
         kind, _, rest = name.partition(".")
@@ -138,12 +138,15 @@ class VariedMachine:
         self.own = machine.mechanism()
         self._left: dict[frozenset[str], LeftOut | None] = {}
         self.of_structure = kind == "bodies" and machine.bodies[rest.partition(".")[0]].is_structure
-        if not self.of_structure:  # whose methods take numbers only
+        if not self.of_structure:  # methods of structures take numbers, not symbols
             self.mechanism = with_values(machine, {name: _VARIED}).mechanism()
             self.left = left_out(self.own, touched(self.own))
 
     def matrices(self, values: Array, whole: bool = False) -> MachineMatrices:
-        """Matrices of the machines with values (p,), SI, which are not checked; if `whole`, of all coordinates."""
+        """Matrices of the machines with parameter `values` (p,), SI, which are not checked.
+
+        If `whole`, of all coordinates.
+        """
         if self.of_structure:
             mechanisms = [with_values(self.machine, {self.name: float(one)}).mechanism() for one in values]
             left = None if whole else self._left_of(mechanisms)
@@ -152,7 +155,7 @@ class VariedMachine:
         return _Assembler(self.mechanism, values, None if whole else self.left).matrices()
 
     def _left_of(self, mechanisms: Sequence[Mechanism]) -> LeftOut | None:
-        """Part that can be left out of all of the machines; None if their structures differ."""
+        """Coordinates that can be left out of all the machines; None if their structures differ."""
         if not all(alike(one.structures, self.own.structures) for one in mechanisms):
             return None
         names = frozenset().union(*map(touched, (self.own, *mechanisms)))
@@ -162,7 +165,7 @@ class VariedMachine:
 
 
 def _stacked(several: list[MachineMatrices]) -> MachineMatrices:
-    """Machines that differ in numbers only as one, along a leading axis."""
+    """Machines that differ in numbers only, combined along a leading axis."""
 
     def together(records: Sequence[Any], names: tuple[str, ...]) -> dict[str, Any]:
         return {name: np.stack([getattr(one, name) for one in records]) for name in names}
@@ -201,7 +204,7 @@ class _Assembler:
             start += len(part.coordinates)
 
     def number(self, given: Any) -> Any:
-        """A number of the mechanism: a float, or one for each value (p,) of the varied parameter."""
+        """A number of the mechanism as a float, or, if it depends on the varied parameter, one float per value (p,)."""
         if not isinstance(given, sp.Basic) or _VARIED not in given.free_symbols:
             return float(given)
         if given not in self.known:
@@ -220,7 +223,7 @@ class _Assembler:
         return found
 
     def moving(self, shares: Mapping[str, Any]) -> Any:
-        """Velocity (m/s) that the motion of the load point contributes to a row's velocity."""
+        """Velocity (m/s) that the motion of the load point contributes to the quantity with these coefficients."""
         return self.number(shares.get(LOAD_POINT, 0)) * self.velocity
 
     def matrices(self) -> MachineMatrices:
@@ -296,9 +299,9 @@ class _Assembler:
         )  # fmt: skip
 
     def _pulling(self, port: ContactPort) -> tuple[str, list[Element], list[Element], bool]:
-        """Body that a contact holds, elements whose pull is T, those whose stiffness is k, and if a controller pulls.
+        """The body that a contact holds, the elements of T, the elements of k, and True if a controller may pull too.
 
-        As in `steadyslip.model.forces`.
+        T and k are defined as in `steadyslip.model.forces`.
         """
         body, pulling = next(name for name in port.slip if name != LOAD_POINT), self.mechanism.pulling(port)
         if body not in {one.name for one in self.mechanism.coordinates}:

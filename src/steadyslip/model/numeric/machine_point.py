@@ -25,7 +25,7 @@ from steadyslip.model.steady_results import ABSENT, SteadyContact, SteadyMachine
 
 @dataclass(frozen=True, eq=False)
 class MachinesAlong:
-    """Machines along one parameter: steady sliding, and pencils E z' = A z.
+    """Machines that differ in one parameter: their steady sliding, and their pencils E z' = A z.
 
     Attributes
     ----------
@@ -34,13 +34,13 @@ class MachinesAlong:
     size : int
         Number of coordinates.
     e, a : ndarray (p, K, K)
-        Rows and columns of the pencils that the parameter may change.
+        Those rows and columns of the pencils that the parameter may change.
     posed : ndarray of bool (p,)
-        As of `StatePencil`.
+        As in `StatePencil`.
     own : StatePencil or None
-        Pencil of the machine itself, if these are not all.
+        Pencil of the machine itself, if `e` and `a` do not contain all rows and columns; else None.
     at : ndarray of int (K,)
-        Their places in it.
+        Indices of the rows of `e` and `a` in the whole pencil.
     """
 
     balance: Balance
@@ -52,7 +52,7 @@ class MachinesAlong:
     at: NDArray[np.int64]
 
     def pencil(self, i: int) -> StatePencil | None:
-        """Pencil of one of the machines; None if it has no steady sliding."""
+        """Pencil of machine number i; None if it has no steady sliding."""
         return self._pencil(i) if self.balance.exists[i] else None
 
     def _pencil(self, i: int) -> StatePencil:
@@ -63,7 +63,10 @@ class MachinesAlong:
         return StatePencil(e, a, self.size, bool(self.posed[i]))
 
     def growing(self, sure: bool) -> NDArray[np.int64]:
-        """Number (p,) of growing eigenvalues; `ILL_POSED`, or if `sure` `UNDECIDED` where rounding hides a sign."""
+        """Number of growing eigenvalues of each machine, (p,).
+
+        It is `ILL_POSED` for ill-posed machines, and, if `sure`, `UNDECIDED` where rounding hides a sign.
+        """
         if self.own is None:
             return growing_roots(self.e, self.a, self.size, self.posed, sure)
         return np.array([self._pencil(i).growing(sure) for i in range(len(self.posed))])
@@ -78,7 +81,7 @@ class MachinePoint(HasCache):
 
     @cached_property
     def matrices(self) -> MachineMatrices:
-        """Matrices, and contacts with the numbers of their laws."""
+        """Matrices of the machine, and its contacts with the parameters of their laws."""
         return assemble(self.machine)
 
     @cached_property
@@ -97,7 +100,7 @@ class MachinePoint(HasCache):
 
     def along(self, name: str, values: Array) -> MachinesAlong:
         """The machine with several values (p,), SI, of a parameter, which are not checked."""
-        whole = not self.balance.exists  # without a pencil of its own
+        whole = not self.balance.exists  # a machine without steady sliding has no pencil
         matrices = self._matrices_along(name, values, whole)
         found = balances(matrices)
         e, a, posed = pencils(matrices, found)
@@ -128,7 +131,7 @@ def _point(machine: Machine) -> MachinePoint:
 
 
 def machine_point(machine: Machine) -> MachinePoint:
-    """The machine in numbers (cached with it).
+    """The machine as numbers at steady sliding; the result is cached with the machine.
 
     Raises
     ------
@@ -141,7 +144,10 @@ def machine_point(machine: Machine) -> MachinePoint:
 
 
 def absence(point: MachinePoint | MeasuredMachine) -> NoSteadySliding:
-    """Error for a machine without steady sliding: which contact locks up or lifts off, and by how much."""
+    """Error for a machine without steady sliding.
+
+    It names the contact that locks up or lifts off, and the shortfall.
+    """
     found = point.balance
     if not found.gain < 1:
         name = point.matrices.sites[int(np.argmax(np.abs(found.wanted)))].name

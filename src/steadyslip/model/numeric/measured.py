@@ -33,33 +33,34 @@ from steadyslip.model.numeric.sampled_response import (
     product,
 )
 
-_SURE = 4.0  # deviations of complex errors: one in e^16 is larger
-_TURN = 1.2  # rad; largest change of the argument between two samples that counts as followed
-_BENT = 0.5  # second difference of the determinant relative to it, of which straight lines are off by an eighth
-_ROUNDS = 12  # of halving between samples
-_ROUNDING = 1e-9  # share of a friction's slope, below which its real part is rounding
-_PUSHED = 0.5  # share of the determinant that friction's push by the normal force may have in the highest octave
-_PASSIVE = 2.6  # rad, of π; largest angle at the end of the band that is surely no other
-_WHOLE = 0.25  # of half turns that are counted
-_NEWTON, _STEP = 30, 1e-7  # steps of Newton's method, and of its differences relative to the root: the root of rounding
-_BELOW = np.concatenate([[0.0], np.geomspace(1e-6, 0.99, 120)])  # places below the band, relative to its begin
-_FIRST = 4.0  # times its first frequency, up to which at least a response is compared with that of a spring
-_POWERS = (-2.0, 0.0, 2.0, 4.0)  # of frequency there
-_MASS, _VAGUE = 3e-3, 0.1  # share in −1/ω² that is none, and its error from which it is not known
+_SURE = 4.0  # errors up to this many standard deviations are allowed for; of complex errors one in e^16 is larger
+_TURN = 1.2  # rad; largest change of the argument between two samples; if it is larger, a sample is added between
+# largest second difference of the determinant over its size; linear interpolation is off by an eighth of it
+_BENT = 0.5
+_ROUNDS = 12  # most halvings of the interval between two samples
+_ROUNDING = 1e-9  # real part of a friction's derivative over its size, below which it is rounding error
+_PUSHED = 0.5  # largest share, in the highest octave, of the determinant due to friction that follows the normal force
+_PASSIVE = 2.6  # rad; largest angle of an eigenvalue at the end of the band, clearly below π, so that it is unambiguous
+_WHOLE = 0.25  # largest difference of the number of half turns from a whole number
+_NEWTON, _STEP = 30, 1e-7  # Newton's method: most steps; relative step of differences, about sqrt(eps)
+_BELOW = np.concatenate([[0.0], np.geomspace(1e-6, 0.99, 120)])  # frequencies below the band, over its first one
+_FIRST = 4.0  # multiple of the first frequency up to which, at least, the response is compared with that of a spring
+_POWERS = (-2.0, 0.0, 2.0, 4.0)  # powers of frequency in that comparison
+_MASS, _VAGUE = 3e-3, 0.1  # share of the −1/ω² term that counts as zero; its error above which it is unknown
 _LOWER = "where it is not surely that of a spring: measure from lower on"
-_BEYOND = np.geomspace(1, 1e4, 60)  # places beyond it, relative to its end
+_BEYOND = np.geomspace(1, 1e4, 60)  # frequencies above the band, over its last one
 
 
 @dataclass(frozen=True)
 class Count:
-    """Growing roots of one machine.
+    """Number of growing roots of one machine.
 
     Attributes
     ----------
     growing : int or None
-        None if that is not decided.
+        Number of growing roots; None if it cannot be decided.
     doubt : str
-        Why it is not.
+        Reason why the number cannot be decided; empty if it is known.
     omega : float
         Frequency (rad/s) at which the determinant comes nearest to 0.
     """
@@ -107,7 +108,7 @@ class ContactStiffness:
         return np.asarray(found)
 
     def storing(self, s: ComplexArray, whole: ComplexArray) -> ComplexArray:
-        """Part of G = `whole` at places on the imaginary axis that stores and takes energy, and gives none."""
+        """Part of G = `whole`, at s on the imaginary axis, that stores or dissipates energy but never supplies it."""
         own = np.einsum("iip->ip", whole) / s
         return np.asarray((np.maximum(own.real, 0) + 1j * own.imag) * s * np.eye(self.size)[..., None])
 
@@ -150,7 +151,10 @@ class MeasuredMachine:
         self._seen: ComplexArray = like._seen if like is not None and alike else self.seen(self.samples.receptance)
 
     def _samples(self, used: NDArray[np.bool_]) -> ReceptanceSamples:
-        """Samples from zero on: below the band the structure is a spring, off by what its first octave changes."""
+        """Samples from zero frequency on.
+
+        Below the band the structure is taken as a spring, with an error from the change in its first octave.
+        """
         omega, first = self.response.omega, self.response.omega[0]
         r, error = (one[:, used][:, :, used] for one in self.response.full)
         if np.any(lost := np.isnan(r)):
@@ -178,7 +182,8 @@ class MeasuredMachine:
         return ReceptanceSamples(omega, *(np.ascontiguousarray(np.moveaxis(one, 0, -1)) for one in (r, error, between)))
 
     def seen(self, receptance: ComplexArray) -> ComplexArray:
-        """Receptance (d, d, p) in slips and distances of the contacts, (2 contacts, 2 contacts, p)."""
+        """Receptance in slips and distances of the contacts, (2 contacts, 2 contacts, p), from that in directions,
+        (d, d, p)."""
         size = self.contacts.size
         return np.asarray((self._both @ receptance.reshape(self._both.shape[1], -1)).reshape(size, size, -1))
 
@@ -188,7 +193,7 @@ class MeasuredMachine:
 
     @cached_property
     def count(self) -> Count:
-        """Growing roots, or why they are not decided."""
+        """Number of growing roots, or the reason why it cannot be decided."""
         with np.errstate(all="ignore"):
             omega, ratio, noise, between = self._followed()
             at = float(omega[np.argmin(np.abs(ratio))])
@@ -207,7 +212,10 @@ class MeasuredMachine:
         return Count(-round(turns), "", at)
 
     def _followed(self) -> tuple[Array, ComplexArray, Array, Array]:
-        """Frequencies, determinant, and how far noise and what lies between samples may move it, dense at its turns."""
+        """Frequencies, determinant, and its possible errors by noise and between samples.
+
+        Samples are added where the determinant turns.
+        """
         own = self.samples
         omega, ratio, noise, between = own.omega, *self._determinants(own, self._seen)
         for _ in range(_ROUNDS):
@@ -229,7 +237,7 @@ class MeasuredMachine:
         return omega, ratio, noise, between
 
     def _determinants(self, at: ReceptanceSamples, seen: ComplexArray) -> tuple[ComplexArray, Array, Array]:
-        """det(I + R G), its surely largest error by noise, and that by what lies between samples, each (p,)."""
+        """det(I + R G), the largest likely error by noise, and the error between samples, (p,) each."""
         g = self.contacts(1j * at.omega)
         inner = np.eye(len(g))[..., None] + product(seen, g)
         ratio = determinant(inner)
@@ -239,7 +247,7 @@ class MeasuredMachine:
         return ratio, noise, np.sum(slope * at.between, axis=(0, 1))
 
     def _doubt(self, omega: Array, ratio: ComplexArray, noise: Array, between: Array) -> str:
-        """Reason why turns inside the band are not known; empty if they are known."""
+        """Reason why the turns of the determinant inside the band are not known; empty if they are known."""
         far = ~(noise + between < np.abs(ratio))
         far[1:] |= ~_follows(ratio)
         if not np.any(far):
@@ -279,7 +287,7 @@ class MeasuredMachine:
         return ""
 
     def _doubt_beyond(self) -> str:
-        """Reason why turns beyond the band are not known; empty if they are known."""
+        """Reason why the turns of the determinant beyond the band are not known; empty if they are known."""
         own, last = self.samples, self.samples.omega[-1]
         top = own.omega >= last / 2
         s, r = 1j * own.omega[top], self._seen[..., top]
@@ -301,7 +309,7 @@ class MeasuredMachine:
         return ""
 
     def _angles(self) -> Array:
-        """Angles of the eigenvalues of I + R G at the end of the band, with the storing part of G there."""
+        """Angles of the eigenvalues of I + R G at the end of the band, with only the storing part of G."""
         last = 1j * self.samples.omega[-1:]
         stored = self.contacts.storing(last, self.contacts(last))
         return np.asarray(np.angle(1 + np.linalg.eigvals(self._seen[..., -1] @ stored[..., 0])))
@@ -312,9 +320,9 @@ class MeasuredMachine:
         return -angles - float(np.angle(last * np.exp(-1j * angles)))
 
     def root(self) -> tuple[complex | None, float]:
-        """Growing root (1/s) next to where the determinant is nearest to 0, and by how much errors may move it.
+        """Growing root (1/s) near the frequency at which the determinant is smallest, and its possible error.
 
-        None where none is found near enough to the axis for the response to be continued to it.
+        The root is None if Newton's method finds none close to the axis, to which the response can be continued.
         """
         s = 1j * self.count.omega
         for _ in range(_NEWTON):
@@ -333,13 +341,13 @@ class MeasuredMachine:
         return s, float((noise + between)[0] / abs(slope))
 
     def determinant(self, s: complex) -> complex:
-        """det(I + R G) near the imaginary axis, R from a polynomial through the nearest samples."""
+        """det(I + R G) near the imaginary axis, with R from a polynomial through the nearest samples."""
         r = self.seen(self.samples.at(np.array([s / 1j])).receptance)[..., 0]
         return complex(np.linalg.det(np.eye(self.contacts.size) + r @ self.contacts(np.array([s]))[..., 0]))
 
 
 def _follows(ratio: ComplexArray) -> NDArray[np.bool_]:
-    """True where a determinant (p,) turns by no more than `_TURN` to the next place, (p − 1,)."""
+    """True (p − 1,) where the argument of a determinant (p,) changes by at most `_TURN` to the next frequency."""
     step = ratio[1:] * ratio[:-1].conj()
     return np.asarray(step.real >= math.cos(_TURN) * np.abs(step))
 
@@ -354,6 +362,6 @@ def _machine(machine: Machine) -> MeasuredMachine:
 
 
 def measured_machine(machine: Machine) -> MeasuredMachine:
-    """The machine with its response (cached with it)."""
+    """The machine with its measured response; the result is cached with the machine."""
     found: MeasuredMachine = _machine(machine)
     return found

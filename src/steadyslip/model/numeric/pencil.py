@@ -21,22 +21,22 @@ from steadyslip.model.numeric.machine_matrices import MachineMatrices, Site
 
 ComplexArray = NDArray[np.complex128]
 
-_MASSLESS = 1e-12  # eigenvalue of the scaled inertia matrix, relative to the largest, that counts as no inertia
-_INFINITE = 1e-9  # 1/eigenvalue of a pencil in units of its own frequencies below which it is infinite; QZ loses half
+_MASSLESS = 1e-12  # relative singular value of the scaled inertia matrix up to which a motion counts as massless
+_INFINITE = 1e-9  # 1/eigenvalue, scaled by typical frequencies, below which the eigenvalue is infinite; QZ loses digits
 _TRUSTED = 1e-8  # relative error of the resolvent by eigenvectors, above which equations are solved instead
-_SPOILT = 1e8  # condition of E from which dividing by it loses half of the digits
-_INVERSE_STEPS = 3  # of inverse iteration; one is enough where no other eigenvalue is near
-_MARGIN = 10.0  # rounding errors between a real part and zero that leave no doubt of its sign
+_SPOILT = 1e8  # condition of E above which division by E loses half of the digits
+_INVERSE_STEPS = 3  # steps of inverse iteration; one step is enough if no other eigenvalue is near
+_MARGIN = 10.0  # real part over its rounding error above which the sign of the real part is certain
 _SURE = 1e-9  # real part, relative to the largest eigenvalue, above which rounding cannot change its sign
-_ASIDE = 1e-12  # relative distance from an undamped mode at which its response is far larger than all others
-_PLAIN, _ADJOINT = 0, 2  # matrices of equations, as LAPACK counts them
-ILL_POSED, UNDECIDED = -1, -2  # in place of a number of growing eigenvalues
-_BATCH = 2**22  # complex numbers of matrices that are solved at once, 64 MiB
+_ASIDE = 1e-12  # relative shift of s off an undamped mode; the response of this mode still exceeds all others
+_PLAIN, _ADJOINT = 0, 2  # codes of LAPACK for equations with the matrix itself, and with its adjoint
+ILL_POSED, UNDECIDED = -1, -2  # values that stand for a number of growing eigenvalues that cannot be given
+_BATCH = 2**22  # most complex numbers in matrices whose equations are solved together: 64 MiB
 
 
 @dataclass(frozen=True, eq=False)
 class StatePencil:
-    """E z' = A z of one machine.
+    """Linearised equations E z' = A z of one machine.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class StatePencil:
     size : int
         Number of coordinates n; z has n displacements, then n velocities.
     posed : bool
-        False if a contact's own equations answer with a sign that any small lag turns into growth (ill-posed).
+        False if the equations of a contact are ill-posed: any small lag would make disturbances grow.
     """
 
     e: Array
@@ -54,14 +54,18 @@ class StatePencil:
 
     @cached_property
     def scale(self) -> tuple[Array, Array]:
-        """Factors of rows and of columns that make the pencil even: displacements times a frequency as velocities."""
+        """Factors of rows and of columns after which all rows and columns of the pencil have similar size.
+
+        Displacements are multiplied by a frequency, and then compare with velocities.
+        """
         return _even(self.e, self.a, self.size)
 
     @cached_property
     def inertial(self) -> bool:
-        """True if E can be inverted: every coordinate has inertia.
+        """True if E can be inverted, that is, if every coordinate has inertia.
 
-        Beside the inertia E has ones on its diagonal, and rates of memories by accelerations below it.
+        Besides the inertia, E has ones on its diagonal, and below it the effect of accelerations on rates of memory
+        variables.
         """
         from scipy.linalg import lapack  # slow to import
 
@@ -70,14 +74,16 @@ class StatePencil:
         even = self.e[moving, moving] * rows[moving, None] * columns[moving]
         factors, _, _ = lapack.dgetrf(even)
         estimate, _ = lapack.dgecon(factors, np.max(np.sum(np.abs(even), axis=0)))
-        if estimate > _MASSLESS * len(even):  # in sums of entries, up to n times the singular values, which take longer
+        # norms are sums of entries: up to n times the singular values, which take longer
+        if estimate > _MASSLESS * len(even):
             return True
         sizes = np.linalg.svd(even, compute_uv=False)
         return bool(sizes[-1] > _MASSLESS * sizes[0])
 
     @cached_property
     def _standard(self) -> tuple[Array, Array, Array]:
-        """State matrix in modal coordinates, and matrices from its states to z and from the rows of E to its rates."""
+        """State matrix in modal coordinates, and the matrices that convert its states to z, and rows of E to its
+        rates."""
         basis, left = self._modal_basis()
         at, moving, rest = slice(self.size), slice(self.size, 2 * self.size), slice(2 * self.size, None)
         left[at, at] = np.linalg.solve(left[at, at] @ basis[at, at], left[at, at])  # E is the identity there
@@ -93,11 +99,11 @@ class StatePencil:
         return state, basis, left
 
     def _modal_basis(self) -> tuple[Array, Array]:
-        """Matrices from modal states to z, and from rows of the pencil to modal rows.
+        """Matrices that convert modal states to z, and rows of the pencil to modal rows.
 
-        In modes of the symmetric parts of stiffness and inertia, with velocities comparable to displacements times
-        frequency, the lowest mode of a structure is as accurate as the highest. Without such modes the pencil is only
-        balanced.
+        Modes are those of the symmetric parts of stiffness and inertia; displacements are multiplied by their
+        frequency. The lowest mode of a structure is then as accurate as the highest. If there are no such modes, the
+        pencil is only scaled.
         """
         size, at, moving = self.size, slice(self.size), slice(self.size, 2 * self.size)
         mass, stiffness = (0.5 * (m + m.T) for m in (self.e[moving, moving], -self.a[moving, at]))
@@ -125,13 +131,16 @@ class StatePencil:
         """Finite eigenvalues (1/s), by falling real part."""
         found = np.linalg.eigvals(self._standard[0]) + 0j if self.inertial else _finite_eigenvalues(self)
         upper = found[found.imag > 0]
-        if 2 * len(upper) == np.count_nonzero(found.imag):  # QZ gives the two of a pair apart by rounding
+        if 2 * len(upper) == np.count_nonzero(found.imag):  # QZ gives conjugate eigenvalues that differ by rounding
             found = np.concatenate([upper, upper.conj(), found[found.imag == 0]])
         return found[np.lexsort((-found.imag, -found.real))]
 
     @cached_property
     def _decomposed(self) -> tuple[ComplexArray, ComplexArray, ComplexArray] | None:
-        """Eigenvalues, right vectors in z and left vectors in rows of E, if these reproduce the resolvent."""
+        """Eigenvalues, right vectors in z and left vectors in rows of E.
+
+        None if they do not reproduce the resolvent.
+        """
         if not self.inertial:
             return None
         state, basis, left = self._standard
@@ -142,14 +151,18 @@ class StatePencil:
             return None
         right, rows = basis @ vectors, other @ left
         probe = np.linspace(-1.0, 1.0, len(state))
-        for s in (1.1j * np.median(np.abs(values)), 0.1j * np.max(np.abs(values))):  # the median itself is a mode
+        # not at the median itself, which is a mode
+        for s in (1.1j * np.median(np.abs(values)), 0.1j * np.max(np.abs(values))):
             fast, slow = right @ ((rows @ probe) / (s - values)), self._solved(np.array([s]), probe[:, None])[0, :, 0]
             if not np.allclose(fast * 1, slow, rtol=0, atol=_TRUSTED * np.max(np.abs(slow))):
                 return None
         return values, right, rows
 
     def growing(self, sure: bool) -> int:
-        """Number of eigenvalues with a positive real part; if `sure`, `UNDECIDED` where rounding hides a sign."""
+        """Number of eigenvalues with positive real part.
+
+        `ILL_POSED` or, if `sure`, `UNDECIDED` where rounding hides a sign.
+        """
         if not self.posed:
             return ILL_POSED
         roots = self.eigenvalues
@@ -172,14 +185,17 @@ class StatePencil:
         return found[0].conj() * rows, found[1] * columns
 
     def _solver(self, s: complex) -> Callable[[NDArray[Any], int], tuple[NDArray[Any], float]]:
-        """Solutions, of size one, and their sizes before, of equations with the matrix s E − A made even."""
+        """Function that solves equations with the scaled matrix s E − A.
+
+        It returns unit vectors and their lengths before.
+        """
         from scipy.linalg import lapack  # slow to import
 
         rows, columns = self.scale
         factors, pivots, _ = lapack.zgetrf(rows[:, None] * (s * self.e - self.a) * columns)
         diagonal = np.einsum("ii->i", factors)
         last, largest = np.finfo(float).eps, np.max(np.abs(diagonal), initial=0.0)
-        diagonal[np.abs(diagonal) < last**2 * largest] = last * largest  # an eigenvalue to the last digit
+        diagonal[np.abs(diagonal) < last**2 * largest] = last * largest  # s is an eigenvalue to the last digit
 
         def solved(right: NDArray[Any], way: int) -> tuple[NDArray[Any], float]:
             found = lapack.zgetrs(factors, pivots, right, trans=way)[0]
@@ -197,7 +213,8 @@ class StatePencil:
     def error(self, s: complex) -> float:
         """Distance (1/s) of `s` from an eigenvalue, by one step of inverse iteration on the matrices themselves.
 
-        Independent of how the eigenvalue was found; from the singular vectors of least value, by inverse iteration.
+        The result does not depend on how the eigenvalue was found. It uses the singular vectors of least singular
+        value.
         """
         rows, columns = self.scale
         solved, size = self._solver(s), np.inf
@@ -233,7 +250,10 @@ class StatePencil:
         return solved
 
     def _solved(self, s: ComplexArray, right: Array) -> ComplexArray:
-        """Products (p, N, m) of (s E − A)⁻¹ and `right` (N, m) at s (p,); slightly off an s that is an eigenvalue."""
+        """Products (p, N, m) of (s E − A)⁻¹ and `right` (N, m) at s (p,).
+
+        An s that is an eigenvalue is slightly shifted.
+        """
         matrices = s[:, None, None] * self.e - self.a
         try:
             return np.asarray(np.linalg.solve(matrices, np.broadcast_to(right, (len(s), *right.shape))))
@@ -250,9 +270,9 @@ def real_product(matrix: Array, vector: NDArray[Any]) -> ComplexArray:
 
 
 def _even(e: Array, a: Array, size: int) -> tuple[Array, Array]:
-    """Factors (..., N) of rows and columns of pencils (..., N, N).
+    """Factors (..., N) of rows and of columns that give all rows and columns of pencils (..., N, N) similar size.
 
-    One frequency for all displacements of a machine, then every row and column of size one.
+    All displacements of a machine are multiplied by one frequency; then every row and column is scaled to size one.
     """
     inertia = np.abs(np.diagonal(e, axis1=-2, axis2=-1)[..., size : 2 * size])
     springs = np.abs(np.diagonal(a[..., size : 2 * size, :size], axis1=-2, axis2=-1))
@@ -262,7 +282,7 @@ def _even(e: Array, a: Array, size: int) -> tuple[Array, Array]:
     omega = np.sqrt(np.nanmedian(squares, axis=-1))[..., None, None]
     both = np.abs(e) * omega + np.abs(a)
     rows, columns = np.ones(e.shape[:-1]), np.ones(e.shape[:-1])
-    for _ in range(4):  # sweeps; each halves what is left of the differences
+    for _ in range(4):  # each round of scaling halves the differences in size
         for factors, axis in ((rows, -1), (columns, -2)):
             by = 1 / np.sqrt(np.maximum(np.max(both, axis=axis), 1e-300))
             factors *= by
@@ -291,7 +311,8 @@ def linearised(machine: MachineMatrices, found: Balance) -> StatePencil:
 
 
 def pencils(machine: MachineMatrices, found: Balance) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """E and A (..., N, N) of machines at steady sliding, and where their contacts' equations are well-posed, (...)."""
+    """E and A (..., N, N) of machines at steady sliding, and True (...) where the equations of all contacts are
+    well-posed."""
     n, several = len(machine.names), machine.several
     kept = [len(site.laws.memory) + len(site.laws.states) for site in machine.sites]
     size = 2 * n + sum(kept) + machine.integrates
@@ -331,7 +352,8 @@ def _add_contact(
     at, moving = slice(0, n), slice(n, 2 * n)
 
     def of_motion(row: Array) -> Array:
-        """Combination of states by slopes with x, v, v̇ (left out), T, τ (left out), distance and its rate."""
+        """Combination of states with the derivatives `row` for x, v, v̇ (left out), T, τ (left out), distance and
+        its rate."""
         found = np.zeros((*several, width))
         share = np.moveaxis(row, -1, 0)[..., None]
         found[..., at] = share[0] * site.slip + share[3] * site.pull + share[5] * site.apart
@@ -347,7 +369,7 @@ def _add_contact(
     of_friction, of_acceleration = slopes.normal[..., 4], slopes.normal[..., 2]
     determinant = np.broadcast_to(1 - by[2] - by[1] * of_friction, several)
     solved = 1 / determinant  # infinite where ill-posed
-    tau = solved[..., None] * (friction + by[1][..., None] * normal)  # rows over z
+    tau = solved[..., None] * (friction + by[1][..., None] * normal)  # coefficients of the states z
     sigma = solved[..., None] * (of_friction[..., None] * friction + (1 - by[2])[..., None] * normal)
     late_tau, late_sigma = solved * by[1] * of_acceleration, solved * (1 - by[2]) * of_acceleration
     area = np.asarray(site.area)[..., None, None]
@@ -373,8 +395,8 @@ def _add_contact(
 def growing_roots(e: Array, a: Array, size: int, posed: NDArray[np.bool_], sure: bool) -> NDArray[np.int64]:
     """Number of growing eigenvalues of pencils (p, N, N), (p,); `ILL_POSED` or `UNDECIDED` as `StatePencil.growing`.
 
-    All at once by the matrices divided by E, where that loses no digits that the signs of real parts need; else one
-    by one.
+    Matrices are divided by E, all at once, where this loses no digits that matter for the signs of real parts; other
+    pencils are treated one by one.
     """
     good = posed & np.all(np.isfinite(a) & np.isfinite(e), axis=(-2, -1))
     found = np.where(posed, UNDECIDED, ILL_POSED)

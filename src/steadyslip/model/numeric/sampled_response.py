@@ -10,12 +10,13 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.model.numeric.pencil import ComplexArray
 
-_NEAR = 6  # samples through which a polynomial is laid
+_NEAR = 6  # number of neighbouring samples through which the interpolating polynomial passes
 
 
 @dataclass(frozen=True)
 class ReceptanceSamples:
-    """Receptance (d, d, p) over frequency (p,), deviations of its errors, and how far it is off between samples."""
+    """Receptance (d, d, p) at frequencies (p,), standard deviations of its errors, and its possible errors between
+    samples."""
 
     omega: Array
     receptance: ComplexArray
@@ -54,7 +55,7 @@ def product(a: Any, b: Any) -> ComplexArray:
 
 def determinant(a: Any) -> ComplexArray:
     """Determinants (p,) of matrices (n, n, p)."""
-    if len(a) == 2:  # as of one contact: many times faster than LAPACK
+    if len(a) == 2:  # the size for one contact; many times faster than LAPACK
         return np.asarray(a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0])
     return np.asarray(np.linalg.det(np.moveaxis(a, -1, 0)))
 

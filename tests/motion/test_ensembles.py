@@ -1,5 +1,6 @@
 """Many runs in lanes: equal to single runs, independent of each other, of threads and order; honest about failures."""
 
+import concurrent.futures
 from dataclasses import replace
 
 import numpy as np
@@ -221,7 +222,7 @@ def test_regimes_mix():
 
 def test_interruption_returns_what_is_done(monkeypatch):
     """Ctrl-C reaches the main thread while it waits for the others; here, the fourth time that it does."""
-    k, calls, wait = kappas(4000), [], engine.wait
+    k, calls, wait = kappas(4000), [], concurrent.futures.wait
 
     def interrupted(*arguments, **options):
         calls.append(arguments)
@@ -230,7 +231,7 @@ def test_interruption_returns_what_is_done(monkeypatch):
         return wait(*arguments, **options)
 
     monkeypatch.setattr(engine.run_many, "__defaults__", (None, 64, None, 8))
-    monkeypatch.setattr(engine, "wait", interrupted)
+    monkeypatch.setattr(concurrent.futures, "wait", interrupted)
     ensemble = many(k, until=30000.0)
     assert len(calls) == 4
     status = ensemble.status

@@ -32,12 +32,12 @@ except ImportError:  # Windows: only elapsed time is limited
     resource = None  # type: ignore[assignment]
 
 MOST_MEMORY = 2**30
-"""Largest memory of a reader process, bytes written to."""
+"""Largest memory of a reader process, in bytes that it has written to."""
 MOST_ADDRESSES = 2**32  # bytes of address space: more than `MOST_MEMORY`, since allocators reserve in advance
-LASTING = 2**28  # bytes: a reader grown beyond this is ended after its job, to free its memory
-PATIENCE = 3.0 if resource is None else 30.0  # elapsed seconds per second of processor time, shared with other programs
+LASTING = 2**28  # bytes: a reader that uses more memory than this is ended after its job, to free it
+PATIENCE = 3.0 if resource is None else 30.0  # allowed elapsed time over processor time: other programs run too
 _START = "import sys; sys.path[:] = sys.argv[1:]; from steadyslip.files.apart import serve; serve()"
-_readers: dict[int, subprocess.Popen[bytes]] = {}  # reader by process id, so that a fork starts its own
+_readers: dict[int, subprocess.Popen[bytes]] = {}  # by id of the calling process: a fork starts another
 _one_at_a_time = threading.Lock()
 
 
@@ -46,7 +46,7 @@ class Ended(Exception):
 
 
 def call(module: str, function: str, arguments: Sequence[Any], seconds: float) -> tuple[dict[str, Any], list[Array]]:
-    """Result of a function called in the reader process, or in this process if none can be started.
+    """Result of a function called in the reader process, or in this process if no reader can be started.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def call(module: str, function: str, arguments: Sequence[Any], seconds: float) -
     Raises
     ------
     Ended
-        If it exceeds the limits of memory or time, or crashes its process.
+        If the function exceeds the limits of memory or time, or crashes its process.
     SteadyslipError
         As raised by the function.
     """
@@ -157,7 +157,7 @@ def _end(reader: subprocess.Popen[bytes]) -> None:
     reader.kill()
     reader.wait()
     for pipe in (reader.stdin, reader.stdout):
-        with contextlib.suppress(OSError):  # of unwritten data
+        with contextlib.suppress(OSError):  # writing the remaining data fails
             cast(IO[bytes], pipe).close()
 
 
@@ -178,7 +178,7 @@ def serve() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the calling process, which ends this one
     if resource is not None:
         for limit, most in ((resource.RLIMIT_DATA, MOST_MEMORY), (resource.RLIMIT_AS, MOST_ADDRESSES)):
-            with contextlib.suppress(ValueError, OSError):  # the system has a lower limit already
+            with contextlib.suppress(ValueError, OSError):  # the system already sets a lower limit
                 resource.setrlimit(limit, (most, most))
     for line in sys.stdin.buffer:
         if not _run_job(json.loads(line), answers):
@@ -186,7 +186,7 @@ def serve() -> None:
 
 
 def _run_job(job: dict[str, Any], answers: IO[bytes]) -> bool:
-    """Run a job and write its answer; True if another may follow."""
+    """Run a job and write its answer; True if another job may follow."""
     if job["folder"] is not None:
         os.chdir(job["folder"])
     if resource is not None:
@@ -217,7 +217,7 @@ def more_time(seconds: int) -> None:
 
 
 def _limit_time(seconds: float) -> None:
-    with contextlib.suppress(ValueError, OSError):  # there is a lower one already
+    with contextlib.suppress(ValueError, OSError):  # a lower limit is set already
         resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, resource.getrlimit(resource.RLIMIT_CPU)[1]))
 
 

@@ -25,7 +25,7 @@ def example_files() -> dict[str, str]:
         If the package was installed without them.
     """
     folder = _folder()
-    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc")  # made by pip
+    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc")  # pip makes .pyc files
     found = sorted(path.relative_to(folder).as_posix() for path in files)
     return {name: _headline(folder / name) for name in sorted(found, key=lambda name: (name.count("/"), name))}
 

@@ -78,7 +78,7 @@ def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, priv
     finally:
         os.close(descriptor)
     content = parts[0] if len(parts) == 1 else b"".join(parts)
-    _check_size(name, len(content), most)  # the file may have grown, or its file system reports no sizes
+    _check_size(name, len(content), most)  # the file may have grown since, or its file system reports no sizes
     return content
 
 
@@ -100,7 +100,7 @@ def check_file(path: str | PathLike[str], most: int) -> int:
 
 
 def inside(root: Path, key: str) -> Path:
-    """Path below the folder `root` for a `key`, names joined by ``/`` as in ``rate/c/0/1``; it need not exist.
+    """Path in the folder `root` for a `key` such as ``rate/c/0/1``, which joins names by ``/``; it need not exist.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def inside(root: Path, key: str) -> Path:
 
 
 def check_room(path: Path) -> Path:
-    """Return the path of a file to be written, after checking that it is no folder.
+    """Return the path of a file to be written, after a check that the path is not a folder.
 
     Raises
     ------

@@ -20,9 +20,9 @@ from steadyslip.core.arrays import Array
 T = TypeVar("T")
 _DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12  # tags of lists in the header
 _TYPES = {1: "i1", 2: "S1", 3: ">i2", 4: ">i4", 5: ">f4", 6: ">f8"}  # NumPy types by type number in the header
-_MOST = 100_000  # most entries of all lists together; chosen by trial, far above files of this program
-_LONGEST = 1000  # most numbers of an attribute; this program writes one
-_DEEPEST = 32  # most dimensions of a variable: NumPy's limit up to version 1
+_MOST = 100_000  # largest number of entries of all lists together; chosen by trial, far above files of this program
+_LONGEST = 1000  # largest number of values of an attribute; this program writes one value
+_DEEPEST = 32  # largest number of dimensions of a variable: NumPy's limit up to version 1
 
 
 class FormatError(ValueError):
@@ -167,7 +167,7 @@ class _Reader:
         own = [self.dims[place] for place in places]
         attributes = self.entries(_ATTRIBUTES, self.attribute)
         kind = self.type()
-        self.number()  # size of the variable: redundant, and may overflow here
+        self.number()  # size of the variable: not needed, and may overflow in this format
         begin = self.number(self.offset)
         shape = tuple(length for _, length in own)
         size = math.prod(shape) * np.dtype(kind).itemsize

@@ -22,7 +22,7 @@ from steadyslip.files.netcdf import File, FileVariable, FormatError, read
 from steadyslip.files.output import check_output
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 
-_SIZES = "sizes"  # attribute with all dimension lengths: variables of length 0, which the format lacks, are left out
+_SIZES = "sizes"  # attribute with the lengths of all dimensions, because the format cannot store variables of length 0
 _PART = re.compile(r"part([1-9][0-9]{0,4})\.(.+)", re.DOTALL)  # name of a variable or attribute of a part
 
 
@@ -75,13 +75,13 @@ def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any, parts: 
 
 
 def _whole(dataset: Any) -> Any:
-    """Dataset with dimension lengths as an attribute, and without empty columns, which the format does not support."""
+    """Dataset with the lengths of its dimensions as an attribute, without empty columns, which netCDF cannot store."""
     kept = dataset.drop_vars([name for name, variable in dataset.variables.items() if not variable.size])
     return kept.assign_attrs({_SIZES: json.dumps(dict(dataset.sizes))})
 
 
 def _apart(file: File) -> list[File]:
-    """Contents of a file, split into that of the result itself, then of its parts in order."""
+    """Contents of a file: first those of the result itself, then those of its parts in order."""
     found: dict[int, File] = {0: File({}, {}, {})}
     for what in ("attributes", "variables"):
         for name, value in getattr(file, what).items():
@@ -143,7 +143,7 @@ class ExpectedTable:
         self.sizes: dict[str, int] = sizes
 
     def fault(self, what: str) -> NotAvailable:
-        """Error, to be raised by the caller, for a file whose content is not as declared."""
+        """Error, which the caller raises, for a file whose content is not as declared."""
         return NotAvailable(f"cannot read {str(self.path)!r}: as a {self.kind.name}, {what}; {self.kind.remedy}")
 
     def json(self, text: Any, form: Any) -> Any:

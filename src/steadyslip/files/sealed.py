@@ -23,7 +23,7 @@ from steadyslip.files.inputs import read_bytes
 from steadyslip.files.output import whole_file
 
 _LINE = re.compile(rb"\nsteadyslip ([a-z]{1,20}) ([0-9]{1,6}) ([0-9a-f]{64}) ([0-9a-f]{64})\n\Z")
-_LONGEST = 180  # upper bound of the length of the seal line, bytes: at most 170
+_LONGEST = 180  # bytes; upper bound of the length of the seal line, which has at most 170
 _DIGEST = 65  # bytes of the last field of the seal line, with line end
 
 
@@ -50,7 +50,7 @@ class FileKind:
 
 
 def seal(content: bytes, kind: FileKind, of: str = "") -> bytes:
-    """Content with its seal appended; `of` is the purpose, which must be given again for reading."""
+    """Content with its seal appended; `of` is the purpose of the file, which reading must give again."""
     line = f"\nsteadyslip {kind.name} {kind.version} {_name(of)} ".encode()
     digest = hashlib.sha256(content)
     digest.update(line)

@@ -22,16 +22,16 @@ from steadyslip.machine.structures import StructureBody
 
 SPEEDS = ("m/s", "rad/s")
 STIFFNESSES = ("N/m", "Pa/m")
-STRETCHED = 1.0  # m: friction stretches the softest real axes and presses by some 10 mm
-FAST = 1.0  # m/s, speed of seismic slip: faster contacts exist, but a bare 20 may mean um/s or mm/min
-FASTEST = 3e8  # m/s, speed of light: faster values get another error
+STRETCHED = 1.0  # m: stretch of a spring by friction that is implausible; the softest real axes and presses have 10 mm
+FAST = 1.0  # m/s, speed of seismic slip: faster contacts exist, but a number without unit may be meant in um/s
+FASTEST = 3e8  # m/s, speed of light: faster speeds get an error elsewhere
 
 
 class Largest(NamedTuple):
-    """Largest known value of a kind of parameter, and the value above which a bare number gets a warning; SI units.
+    """Largest known value of a kind of parameter, and limit above which a bare number gets a warning; SI units.
 
-    Between that limit and `ABSURD` times it, another unit, per cent or the reciprocal may be meant. `of` says whether
-    the largest is in use or measured.
+    For a number between `limit` and `ABSURD` times `limit`, another unit, per cent or the reciprocal may be meant. `of`
+    says whether the largest known value is in use or was measured.
     """
 
     value: float
@@ -39,7 +39,7 @@ class Largest(NamedTuple):
     of: str = "in use"
 
 
-ABSURD = 1e4  # times the limit: 1e3 for mm given as m, and ten more; larger numbers are of dimensionless rigs
+ABSURD = 1e4  # multiple of the limit: 1e3 if mm are meant, times ten; larger numbers belong to dimensionless rigs
 LARGEST = {
     ("slip distance", "m"): Largest(0.1, 0.5, "measured"),
     ("stress share", "1"): Largest(0.6, 3.0, "measured"),  # a and b may be forces, if no load is given
@@ -67,13 +67,13 @@ REMEDIES = {
     "": "write the unit that is meant",
 }
 """Advice by last part of the name, else by SI unit, else ("") for all."""
-UNDAMPED = 1e-4  # share of critical damping below which a dashpot is implausible: steel alone has 1e-4 to 1e-3
+UNDAMPED = 1e-4  # least plausible damping ratio of a dashpot: steel alone has 1e-4 to 1e-3
 SLOWEST_MOTOR = 1e-4  # rad/s, a turn in 17 h: a slower motor may be meant as the speed behind its gear
-LEAST_REDUCTION = 5.0  # least gear reduction for that warning; direct drives do turn as slowly
-BENT = 2e-4  # m: largest plausible bend of bristles before sliding; measured are some um to 0.1 mm
-LIGHTEST = 1000.0  # Pa, 10 cm of water: faults and laboratories have at least ten times as much
+LEAST_REDUCTION = 5.0  # least gear reduction for the warning of slow motors: direct drives do turn as slowly
+BENT = 2e-4  # m: largest plausible bend of bristles before sliding; measured bends are some um to 0.1 mm
+LIGHTEST = 1000.0  # Pa, least plausible normal stress, 10 cm of water: faults and laboratories have ten times as much
 LIGHT = 0.05  # least plausible load on a contact, as share of the body's weight
-BEYOND_LAW = 1e5  # largest plausible speed over a law's own: laboratories span some five decades
+BEYOND_LAW = 1e5  # largest plausible ratio of a speed to those of the law: laboratories span some five decades
 
 
 def warn_of_values(rig: Rig, read: Mapping[str, tuple[Any, str]], written: Iterable[str]) -> None:
@@ -117,14 +117,14 @@ def _speeds(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _doubts(rig: Rig, questioned: Collection[str]) -> Iterator[str]:
-    """Warnings of friction laws about their values, once for contacts with equal warnings.
+    """Warnings of friction laws about their values; contacts with equal warnings get one warning together.
 
-    Contacts of which a value is in `questioned`, so that a warning on it was given already, are skipped.
+    A contact is skipped if one of its values is in `questioned`, because a warning on that value was given already.
     """
     found: dict[str, list[str]] = {}
     for one in rig.laws_by_contact().values():
         if any(name.startswith(f"{one.prefix}friction.mu_") for name in questioned):
-            continue  # a law's warnings compare these values
+            continue  # the law's warnings compare values that are doubtful already
         for text in one.friction.doubts():
             found.setdefault(text, []).append(one.prefix)
     yield from _structure_doubts(rig)
@@ -134,7 +134,7 @@ def _doubts(rig: Rig, questioned: Collection[str]) -> Iterator[str]:
 
 
 def _structure_doubts(rig: Rig) -> Iterator[str]:
-    """Warnings of structures, and of contacts at points that cannot move along or across the slide."""
+    """Warnings about structures, and about contacts at points that cannot move along or across the slide."""
     structures = {name: body for name, body in rig.bodies.items() if isinstance(body, StructureBody)}
     own_doubts = {name: list(body.doubts()) for name, body in structures.items()}
     for name, texts in own_doubts.items():
@@ -163,7 +163,7 @@ def _structure_doubts(rig: Rig) -> Iterator[str]:
 
 
 def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Warnings of stiffnesses without a unit that the load of a contact would stretch by `STRETCHED` or more."""
+    """Warnings of stiffnesses without a unit so soft that a contact's load would stretch them by `STRETCHED`."""
     presses = max(
         (rig.load_of(f"{prefix}friction") or 0.0 for prefix, *_ in rig.laws_by_contact().values()), default=0.0
     )
@@ -179,7 +179,7 @@ def _soft(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _large(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[tuple[str, str]]:
-    """Names and warnings of numbers far above `LARGEST`, without a unit or with a wrong one."""
+    """Names and warnings of numbers far above `LARGEST`, whose unit is missing or seems wrong."""
     parameters = rig.parameters()
     for name, (raw, si) in read.items():
         last, one = name.rpartition(".")[2], parameters.get(name)
@@ -198,7 +198,7 @@ def _large(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[tuple[str,
 
 
 def _undamped(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Warning of a damping below 1 without a unit that hardly damps: a damping ratio may be meant."""
+    """Warning of a damping below 1 that has no unit and hardly damps, so that a damping ratio may be meant."""
     name, raw, area = "slider.damping", read.get("slider.damping", (None, ""))[0], rig.area or 1.0
     own = (float(rig.parameters()[one].value or 0.0) * area if one in rig.parameters() else 0.0
            for one in ("slider.mass", "slider.stiffness"))  # fmt: skip
@@ -227,7 +227,7 @@ def _idle(rig: Rig) -> Iterator[str]:
 
 
 def _pliable(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Warnings of bristle stiffnesses without a unit that are far softer than all measured."""
+    """Warnings of bristle stiffnesses that have no unit and are far below all measured stiffnesses."""
     for name in rig.of_kind("bristle stiffness"):
         raw, si = read.get(name, (None, ""))
         friction = friction_at_rest(rig, name)
@@ -240,7 +240,7 @@ def _pliable(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
 
 
 def _light(rig: Rig, read: Mapping[str, tuple[Any, str]]) -> Iterator[str]:
-    """Warnings of loads without a unit that are far less than a body's weight, or less than `LIGHTEST`."""
+    """Warnings of loads that have no unit and are far less than a body's weight, or less than `LIGHTEST`."""
     for name in rig.of_kind("normal stress"):
         raw, si = read.get(name, (None, ""))
         load, weight = rig.load_of(name), G * mass_on(rig, name)
@@ -263,14 +263,14 @@ def _is_between(raw: Any, low: float, high: float) -> bool:
 
 
 def _fits_better(number: float, texts: Sequence[str], si: str) -> bool:
-    """True if a number, read in the unit of one of `texts`, is nearer to their speeds than in the SI unit."""
+    """True if a number in the unit of one of `texts` is nearer to the speeds in `texts` than in the SI unit."""
     speeds = [(abs(parse(text, si)), unit(name)[0]) for text in texts for name in units_in([text])]
     away = [(abs(math.log(number / v)), abs(math.log(number * factor / v))) for v, factor in speeds if v]
     return bool(away) and min(one for _, one in away) < min(one for one, _ in away)
 
 
 def _outrun(rig: Rig, speed: float) -> str:
-    """Text on how far a speed (m/s) exceeds those of the friction law; empty if it is plausible."""
+    """Text on how far a speed (m/s) exceeds the speeds of the friction law; empty if the speed is plausible."""
     kinds = ("reference rate", "velocity scale")
     own = {name: float(rig.value(name) or 0.0) for kind in kinds for name in rig.of_kind(kind)}
     if not any(own.values()) or speed < FAST or speed < BEYOND_LAW * max(own.values()):

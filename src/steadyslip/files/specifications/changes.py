@@ -24,15 +24,15 @@ from steadyslip.machine.slider import Slider
 
 
 def apply(text: str, tables: Table, lines: dict[str, int], section: Section | None = None) -> list[Problem]:
-    """Write ``name=value`` into the tables and drop the line numbers of the old value; returns the problems.
+    """Write ``name=value`` into the tables, and delete the line numbers of the old value; returns the problems.
 
-    `section` is the additional table (map, fit) that has the name, None for tables of the rig and protocol.
+    `section` is the additional table (map, fit) that has the name; None for tables of the rig and protocol.
     """
     name, equals, raw = split(text)
     if not equals or not name or not raw:
         return [Problem(repr_short(text), "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
     full, problems = full_name(name, tables)
-    if problems:  # written into the tables, the name would be reported again
+    if problems:  # in the tables, the name would be reported again
         return problems
     *path, last = full.split(".") if section is None else _keys_to(full, section, tables)
     table: Any = tables
@@ -42,7 +42,7 @@ def apply(text: str, tables: Table, lines: dict[str, int], section: Section | No
             table = table[index] if 0 <= index < len(table) else None
         elif isinstance(table, dict):
             inner = table.setdefault(step, {})
-            if isinstance(inner, str) and full in _known_names(tables):  # a law named by a word alone
+            if isinstance(inner, str) and full in _known_names(tables):  # a law given by its name alone
                 inner = table[step] = {"law": inner}
             table = inner
         if not isinstance(table, (dict, list)):
@@ -55,7 +55,7 @@ def apply(text: str, tables: Table, lines: dict[str, int], section: Section | No
     except ParameterError as error:
         return list(error.problems)
     place = ".".join([*path, last])
-    for key in [key for key in lines if f"{key}.".startswith(f"{place}.")]:  # no longer the line of its value
+    for key in [key for key in lines if f"{key}.".startswith(f"{place}.")]:  # the new value is not on these lines
         del lines[key]
     return []
 
@@ -63,8 +63,8 @@ def apply(text: str, tables: Table, lines: dict[str, int], section: Section | No
 def _keys_to(full: str, section: Section, tables: Table) -> list[str]:
     """Keys on the path to a value of an additional table.
 
-    In tables with parameters by dotted name, the keys that the file already has for that parameter are used, even if
-    one of the names is shortened.
+    In tables of parameters by dotted name, the keys that the file already has for a parameter are used, even if the
+    change or the file shortens its name.
     """
     keys = full.split(".")
     family: type[FrozenRecord] | None = section.family
@@ -94,7 +94,7 @@ def _resolved(name: str, known: Mapping[str, Any]) -> str:
 
 
 def split(text: str) -> tuple[str, str, str]:
-    """Name, equals sign and value of a change as text; empty where missing."""
+    """Name, equals sign and value of a change as texts; missing parts are empty."""
     name, equals, raw = (part.strip() for part in text.partition("="))
     return name, equals, raw
 
@@ -133,7 +133,7 @@ def value_of(raw: str, name: str) -> Any:
 
 
 def full_name(name: str, tables: Table) -> tuple[str, list[Problem]]:
-    """Full name for a name that may be shortened to its unique last part, and the problems found."""
+    """Full name of a parameter whose name may be shortened to its unique last part, and the problems found."""
     known = dict.fromkeys(_known_names(tables))
     try:
         return resolve(name, known), []
@@ -164,7 +164,7 @@ def _known_names(tables: Table) -> list[str]:
 
 
 def _names_chosen(family: type[FrozenRecord], table: Table, prefix: str) -> list[str]:
-    """Dotted names of the parameters of the law that a table names."""
+    """Dotted names of the parameters of the law that is named in a table."""
     key, default = selector(family)
     chosen = table.get(key, default)
     law = family.registry.get(chosen) if isinstance(chosen, str) else None

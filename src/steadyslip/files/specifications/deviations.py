@@ -43,7 +43,7 @@ SCHEMA: Schema = {
 
 
 def taken_out(tables: Table) -> tuple[dict[str, Tolerance], list[Problem]]:
-    """Remove tolerances from the values of a rig's tables; returns them by dotted name, and the problems."""
+    """Remove the tolerances from the values in a rig's tables; returns the tolerances by name, and the problems."""
     found: dict[str, Tolerance] = {}
     problems: list[Problem] = []
     names = dict.fromkeys(section.name for section in (*sections(), *machine_sections()))
@@ -59,13 +59,13 @@ def taken_out(tables: Table) -> tuple[dict[str, Tolerance], list[Problem]]:
 
 
 def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[float, float]:
-    """Values at the largest deviations of a parameter to either side, SI units.
+    """Lowest and highest value of a parameter within its tolerance, SI units.
 
     Raises
     ------
     ParameterError
-        With an empty name, if a deviation has another dimension, both are zero, or a value that is not normally
-        distributed could leave its domain.
+        With an empty name: if a deviation has another dimension, both deviations are zero, or a value that is not
+        normally distributed could leave its domain.
     """
     one = rig.parameters()[name]
     value = float(one.value or 0.0)
@@ -94,10 +94,10 @@ def ends_of(rig: Slider | Machine, name: str, tolerance: Tolerance) -> tuple[flo
 
 
 def wrong_ends(rig: Slider | Machine, written: Mapping[str, Tolerance]) -> list[Problem]:
-    """Problems of the tolerances `written` in values, by dotted name."""
+    """Problems with the tolerances in `written`, which a file has in its values, by dotted name."""
     problems: list[Problem] = []
     for path, tolerance in written.items():
-        with suppress(UnknownNameError):  # reported when tolerances are used
+        with suppress(UnknownNameError):  # unknown names are reported when tolerances are used
             name = rig.resolve(path)
             if rig.parameters()[name].value is None:
                 continue
@@ -109,7 +109,7 @@ def wrong_ends(rig: Slider | Machine, written: Mapping[str, Tolerance]) -> list[
 
 
 def _texts(table: Any, path: str) -> Iterator[tuple[str, Any, Any, str]]:
-    """Dotted name, container, key and text of every text in nested tables; members of lists count from 1."""
+    """Dotted name, container, key and content of every text in nested tables; members of lists count from 1."""
     pairs = table.items() if isinstance(table, dict) else enumerate(table)
     for key, value in list(pairs):
         name = f"{path}{key if isinstance(table, dict) else key + 1}"

@@ -1,4 +1,4 @@
-"""Bodies of a rig in forces and the springs that hold them, for warnings of implausible sizes."""
+"""Bodies of a rig and the springs that hold them, in N, kg and N/m, for warnings of implausible sizes."""
 
 from __future__ import annotations
 
@@ -77,19 +77,19 @@ class HoldingSpring(NamedTuple):
 
     @property
     def ends(self) -> list[tuple[HeldBody, float]]:
-        """Bodies at its ends (without ground and drive), each with the stiffness at that end."""
+        """Bodies at the ends of the spring (ground and drive left out), each with the stiffness felt at that end."""
         both = ((self.first, self.stiffness * self.ratio**2), (self.second, self.stiffness))
         return [one for one in both if one[0] is not FIXED_END]
 
     @property
     def frequency(self) -> float:
-        """Natural frequency (Hz) of the two bodies on this spring; inf if one has no inertia."""
+        """Natural frequency (Hz) of the two bodies on this spring; inf if one of them has no inertia."""
         inverse = sum(stiffness / body.inertia if body.inertia else math.inf for body, stiffness in self.ends)
         return math.sqrt(inverse) / (2 * math.pi)
 
     @property
     def heavier(self) -> tuple[HeldBody, float]:
-        """Body with the lower natural frequency on this spring, and the stiffness at that end."""
+        """Body that would have the lower natural frequency alone on this spring, and the stiffness at its end."""
         return min(self.ends, key=lambda one: one[1] / one[0].inertia if one[0].inertia else math.inf)
 
 
@@ -114,7 +114,7 @@ def bodies_of(rig: Rig) -> dict[str, HeldBody]:
 
 
 def springs_of(rig: Rig, bodies: Mapping[str, HeldBody]) -> dict[str, HoldingSpring]:
-    """Springs along the motion by the name of their stiffness; also enters them in `bodies[...].springs`."""
+    """Springs along the motion, by the name of their stiffness; they are also added to `bodies[...].springs`."""
     found = {}
     for name, link in rig.links.items():
         ends = [FIXED_END if end not in rig.bodies else bodies.get(end) for end in link.between]
@@ -142,11 +142,11 @@ def mass_on(rig: Rig, name: str) -> float:
 
 
 def is_of_forces(rig: Rig, name: str) -> bool:
-    """True if the friction of a contact is given as forces (load 1 N), so that its coefficients may have any size."""
+    """True if friction at a contact is given in N, at a load of 1 N, so that coefficients may have any size."""
     return rig.load_of(name) == 1.0
 
 
 def friction_at_rest(rig: Rig, name: str) -> float:
-    """Static friction coefficient of the law to which the parameter `name` belongs; 0 if it has none."""
+    """Static friction coefficient of the law to which the parameter `name` belongs; 0 if the law has none."""
     address = rig.parameters().get(f"{name.rpartition('.')[0]}.mu_static")
     return address.value if address and address.value else 0.0

@@ -56,7 +56,7 @@ UNITS_LINE = "# told in: "
 MAP = "map"
 READ_ELSEWHERE = {MAP: "computes maps"} | dict.fromkeys(("record", "fit", "population"), "fits records")
 """Names of tables that are ignored when a rig is read, and the kind of command that reads each."""
-_OF_FAMILIES = ("law", "kind")  # keys that messages replace by the family's name; other keys, such as motion, are clear
+_OF_FAMILIES = ("law", "kind")  # keys that messages replace by the family's name; others, such as motion, are clear
 
 
 def sections() -> tuple[Section, ...]:
@@ -126,7 +126,7 @@ def own_fields(law: type[FrozenRecord]) -> Iterator[tuple[Field[Any], Declared]]
 
 
 def nested_keys(table: Table, keys: Sequence[str]) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Pairs (keys, value) of a table by dotted names, whose unquoted dots TOML turns into nested tables.
+    """Pairs (keys, value) of a table of dotted names; TOML turns unquoted dots in names into nested tables.
 
     A table with a plain value under one of `keys` counts as a value.
     """

@@ -37,12 +37,12 @@ def number_of(text: str, si: str) -> float | None:
 
 
 def between(low: float, high: float) -> Callable[[float], bool]:
-    """Predicate that is True for values between two others."""
+    """Function that is True for values between `low` and `high`."""
     return lambda value: low < value < high
 
 
 def in_units(written: Any, si: str, fits: Callable[[float], bool]) -> list[tuple[float, str]]:
-    """SI value and text of a written number in each other unit of `UNITS` in which its value `fits`."""
+    """SI values and texts of a written number in other units: those of `UNITS` in which `fits` accepts its value."""
     typed = next(iter(units_in([written])), "") if isinstance(written, str) else si
     value = number_of(written, si) if isinstance(written, str) else written
     if not typed or not isinstance(value, (int, float)) or isinstance(value, bool):
@@ -53,12 +53,12 @@ def in_units(written: Any, si: str, fits: Callable[[float], bool]) -> list[tuple
 
 
 def texts_in_units(read: Read, name: str, si: str, fits: Callable[[float], bool]) -> list[str]:
-    """Texts of the number read for parameter `name` in each other unit in which its value `fits`."""
+    """Texts of the number of parameter `name` in those other units in which `fits` accepts its value."""
     return [text for _, text in in_units(read.get(name, (None, ""))[0], si, fits)]
 
 
 def named(name: str, texts: Iterable[str]) -> list[str]:
-    """Texts with the key before them, for warnings that suggest values of several parameters."""
+    """The texts with the parameter's key before each, for warnings that suggest values of several parameters."""
     return [f"{name.rpartition('.')[2]} = {text}" for text in texts]
 
 

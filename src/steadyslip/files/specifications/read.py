@@ -38,7 +38,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
-CHANGES = "changes (--set)"  # title of errors in changes, in place of a file's name
+CHANGES = "changes (--set)"  # title of the list of errors in changes, in place of a file's name
 
 
 @checked()
@@ -116,12 +116,12 @@ def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -
 
 
 def slider_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider:
-    """Read a slider from TOML text; NotAvailable for a machine."""
+    """Read a slider from TOML text; raises NotAvailable if the text describes a machine."""
     return read_contents(_not_empty(text, source), source, changes).checked_slider()
 
 
 def protocol_of(text: str, source: str, changes: Iterable[str]) -> Protocol | None:
-    """Protocol of a TOML text, which may omit the tables of a rig; None if it has none."""
+    """Protocol of a TOML text, which may omit the tables of a rig; None if the text has no protocol."""
     found = read_contents(_not_empty(text, source), source, changes, rig_needed=False)
     found.refuse()
     return found.protocol
@@ -162,7 +162,7 @@ class RigFileContents:
         return line_of(name, self.lines)
 
     def refuse(self, *others: Problem) -> None:
-        """Raise RigFileError if there are problems in the file or `others`; lists all, each with its line or change."""
+        """Raise RigFileError, which lists all problems with their lines, if the file or `others` has any."""
         if self.problems or others:
             every = list(dict.fromkeys([*self.problems, *others]))
             if all(map(self._is_of_change, every)):
@@ -172,7 +172,7 @@ class RigFileContents:
             raise RigFileError(sorted(found, key=lambda p: (p.line is None, p.line or 0)), title=self.source)
 
     def _is_of_change(self, problem: Problem) -> bool:
-        """True for a problem caused by a change: by its value, or by a name that is not in the file."""
+        """True if a change caused the problem: by its value, or by a name that is not in the file."""
         name, line = problem.name, problem.line or self.line(problem.name)
         below = any(f"{name}.".startswith(f"{one.removesuffix('.law')}.") for one in self.changed)
         missing = line is None and any(one.startswith(f"{name}.") for one in self.changed)
@@ -277,7 +277,7 @@ def read_tables(
         faults += wrong_ends(rig, tolerances)
         if rig.written_in:  # files without any unit are written by programs, in SI units
             warn_of_values(rig, reader.values_read, units_in(tables))
-    wrong = {one.name for one in faults}  # reported once, as problems of tolerances
+    wrong = {one.name for one in faults}  # these are reported once, as problems of tolerances
     problems = [*faults, *(one for one in reader.problems if one.name not in wrong)]
     return RigFileContents(source, rig, protocol, valid, problems, changed, lines, tables, tolerances)
 

@@ -43,8 +43,8 @@ from steadyslip.machine.servo import MachineDrive, wrong_control
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
-RIGID = 1e300  # N/m: placeholder for "rigid", above all real ones; the link is then eliminated from the machine
-LIKE = 0.6  # least similarity of a misspelt table name to the one meant, as of body and bodies
+RIGID = 1e300  # N/m: placeholder for "rigid", above all real stiffnesses; the link is then eliminated
+LIKE = 0.6  # least similarity of a misspelt table name to the name that is meant, as of body and bodies
 
 
 def _rigid(links: Any) -> tuple[Any, list[str]]:
@@ -56,13 +56,13 @@ def _rigid(links: Any) -> tuple[Any, list[str]]:
 
 
 def _joined(first: Table, second: Table) -> Table:
-    """Two tables merged recursively; where both have a value, the first's."""
+    """Two tables merged recursively; where both have a value, that of the first is taken."""
     both = {key: _joined(first[key], one) for key, one in second.items() if isinstance(first.get(key), dict)}
     return {**second, **first, **both}
 
 
 def _is_quantity(value: Any, unit: str) -> bool:
-    """True for text with a number and a unit of the dimension of `unit`."""
+    """True if the value is a text with a number and a unit that has the dimension of `unit`."""
     try:
         return isinstance(value, str) and math.isfinite(parse(value, unit))
     except QuantityError:
@@ -108,7 +108,7 @@ class RigTableReader(TableReader):
         return machine_sections() if is_machine(self.tables) else sections()
 
     def _misspelt(self, name: str, others: set[str]) -> None:
-        """Report a table with a misspelt name, and read it as the one meant, so that it causes no further problems."""
+        """Report a table with a misspelt name, and read it under the right name, which avoids further problems."""
         table, own = self.tables[name], {section.name for section in self._own_sections()}
         if not isinstance(table, dict):
             return
@@ -125,7 +125,7 @@ class RigTableReader(TableReader):
         self.tables = _joined(rest, {meant: table})
 
     def _machine(self) -> Machine | None:
-        """Read a machine; despite invalid tables, references to absent bodies and links in others are reported."""
+        """Read a machine; references to missing bodies and links are reported even if other tables are invalid."""
         before = len(self.problems)
         found: dict[str, Any] = {}
         rigid: list[str] = []
@@ -173,7 +173,7 @@ class RigTableReader(TableReader):
             table = table | {"velocity": 1.0 if value is None else value}
         elif law is not None and _is_quantity(given, "m/s" if law.turns else "rad/s"):
             table = table | {"velocity": 1.0}
-            if "velocity_of" in table:  # an unknown body, which `record` reports
+            if "velocity_of" in table:  # the body is unknown, which `record` reports
                 return self.record(MachineDrive, table, "drive.")
             where = table.get("body", "the load point")
             does = "turns" if law.turns else "slides"
@@ -183,7 +183,10 @@ class RigTableReader(TableReader):
         return self.record(MachineDrive, table, "drive.")
 
     def _as_measured(self, table: Table, law: Any, bodies: Mapping[str, Any]) -> Table:
-        """Table of a drive with values of the measured body read in that body's unit, if only one of them turns."""
+        """Copy of the drive's table in which quantities of the measured body are numbers, read in that body's unit.
+
+        If both drive and measured body turn, or neither, their units agree and the table itself is returned.
+        """
         measured = bodies.get(named) if isinstance(named := table.get("measured"), str) else None
         if law is None or measured is None or measured.turns == law.turns:
             return table
@@ -243,7 +246,7 @@ class RigTableReader(TableReader):
             try:
                 self.area = Parameter("m^2", positive, "contact area").checked(raw)
             except ParameterError:
-                self.area = 1.0  # reported later with the other keys; any area lets totals be read
+                self.area = 1.0  # a wrong area is reported later; until then any area allows totals
 
     def _section(self, section: Section) -> FrozenRecord | None:
         key, default = selector(section.family)

@@ -22,7 +22,7 @@ from steadyslip.files.specifications.layout import (
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
-MOST_DOTS = 4  # most dots in a parameter's name: protocol.pieces.1.to has 3
+MOST_DOTS = 4  # largest number of dots in a parameter's name: protocol.pieces.1.to has 3
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -49,7 +49,7 @@ def rig_schema(further: Sequence[Section] = ()) -> Schema:
 
 
 def _by_key(family: type[FrozenRecord], doc: str) -> Schema:
-    """Schema of a table that contains a table for each name."""
+    """Schema of a table that contains one table for each name chosen by the user."""
     one = _family(family) if has_choice(family) else _table(family, {}, _summary(family))
     return {"type": "object", "description": f"{doc}, a table for each name", "additionalProperties": one}
 
@@ -75,7 +75,7 @@ def partial(schema: Any) -> Any:
 
 
 def _family(family: type[FrozenRecord]) -> Schema:
-    """Schema with one alternative per registered law."""
+    """Schema of a table for a record of this family, with one alternative for each registered law."""
     key, default = selector(family)
     alternatives = []
     for name, law in family.registry.items():
@@ -118,7 +118,7 @@ def _value(role: Declared) -> Schema:
 
 
 def _by_dotted_name(role: Named, depth: int) -> Schema:
-    """Schema of a value, or of values in nested tables, which result from unquoted dots in names."""
+    """Schema of a value, or of values in nested tables, into which TOML turns unquoted dots in names."""
     either = [_table(role.family, {}, _summary(role.family))]
     if role.listed:
         either.append({"type": "array", "items": {"anyOf": [{"type": "number"}, {"type": "string"}]}})

@@ -27,15 +27,15 @@ from steadyslip.files.specifications.other_units import (
 from steadyslip.machine.rig import Rig
 
 SLOWEST = 0.05  # Hz, lowest plausible natural frequency: long drill strings have 0.2 Hz, base isolation 0.3 Hz
-USUAL = 20.0  # Hz, usual natural frequency of a drive: of several units that fit, those nearest to it are suggested
-LONG, TWIST, WAIT = 0.01, 0.3, 1000.0  # m, rad, s: drives deflect less before sliding, and in less time
-SAG = 0.5  # rad, largest plausible sag under a constant torque: arms on springs sag by 0.2 to 0.3 rad by intent
-STEEL = 10.0  # factor by which an assembly of parts is softer than a block of steel
+USUAL = 20.0  # Hz, usual natural frequency of a drive: units that lead nearest to it are suggested
+LONG, TWIST, WAIT = 0.01, 0.3, 1000.0  # m, rad, s: largest plausible deflections of a drive, and time, before sliding
+SAG = 0.5  # rad, largest plausible sag under a constant torque: arms on springs sag by 0.2 to 0.3 rad on purpose
+STEEL = 10.0  # a real assembly of parts is softer than a block of steel by at least this factor
 OVERDAMPED, DAMPED = 1.0, 0.2  # damping ratios: implausible above, usual below; shafts and guides have 0.01 to 0.2
-FAST_GAINS = 3e3  # Hz, frequency of a position gain: ten times the bandwidth of machine drives
-OVERDAMPED_GAIN = 50.0  # damping ratio of gain kd: a load on the motor needs some 10 times that of the motor
-LATE = 0.5  # sample time or delay over the period on gain kp: faster oscillations are not resolved (Nyquist)
-UNLIKE = 500.0  # inertia of a motor, seen through its gear, over that of the body it turns: up to 100 for light arms
+FAST_GAINS = 3e3  # Hz, largest plausible frequency of a body on a position gain: ten times the bandwidth of drives
+OVERDAMPED_GAIN = 50.0  # largest plausible damping ratio of gain kd: a load on a motor needs some 10 times the motor's
+LATE = 0.5  # largest sample time or delay over the period of the body on gain kp (Nyquist)
+UNLIKE = 500.0  # implausible ratio of a motor's inertia, seen through its gear, to its load's: light arms have 100
 GEARED_UP = 10.0  # implausible number of turns of a heavier body per turn of its motor
 
 
@@ -57,7 +57,7 @@ def size_warnings(rig: Rig, read: Read) -> Iterator[SizeWarning]:
     springs = springs_of(rig, bodies)
     if geared := list(_geared_up(rig, bodies)):
         yield from geared
-        return  # springs are at the wrong ends as well, and speeds are wrong
+        return  # with a reversed gear, springs and speeds are wrong as well
     held = [*_stiff(rig, springs, read), *_soft(rig, springs, bodies, read), *_unlike(read, springs)]
     yield from dict(held).items()
     if not held:
@@ -91,7 +91,7 @@ def _stiff(rig: Rig, springs: Mapping[str, HoldingSpring], read: Read) -> Iterat
 def _soft(
     rig: Rig, springs: Mapping[str, HoldingSpring], bodies: Mapping[str, HeldBody], read: Read
 ) -> Iterator[SizeWarning]:
-    """Warnings of the stiffest spring of a body, if all springs together are too soft for the body."""
+    """Warnings that name the stiffest spring of a body, if all its springs together are too soft for the body."""
     for body in bodies.values():
         name = max(body.springs, key=lambda one: body.springs[one], default="")
         if name not in read:
@@ -104,7 +104,7 @@ def _soft(
 
 
 def _loads_meant(rig: Rig, read: Read, spring: HoldingSpring, body: HeldBody) -> list[str]:
-    """Texts of loads of contacts and of the body, in units in which they do not stretch the spring implausibly."""
+    """Texts of the loads on contacts and body in other units, in which they stretch the spring plausibly."""
     found, stiffness = [], sum(body.springs.values())
 
     def fits(load: float, of: float) -> bool:
@@ -119,7 +119,7 @@ def _loads_meant(rig: Rig, read: Read, spring: HoldingSpring, body: HeldBody) ->
 
 
 def _why_soft(spring: HoldingSpring, body: HeldBody, stiffness: float) -> str:
-    """Clause on why a stiffness (N/m or N m/rad) is too soft for a body; empty if it is not."""
+    """Clause on why a stiffness (N/m or N m/rad) is too small for a body; empty if it is plausible."""
     stretch = (body.pull + body.load) / stiffness
     if body.turns and body.load / stiffness > SAG:
         return f"which the constant torque on {body.name} alone twists by {format_quantity(stretch, 'rad')}"
@@ -133,7 +133,7 @@ def _why_soft(spring: HoldingSpring, body: HeldBody, stiffness: float) -> str:
 
 
 def _springs_meant(read: Read, name: str, spring: HoldingSpring) -> list[str]:
-    """Texts of a stiffness in up to two other units, those nearest to that of a drive, or at the other body."""
+    """Texts of a stiffness in up to two other units whose frequency is nearest to `USUAL`, or at the other body."""
 
     def fits(stiffness: float) -> bool:
         one = spring._replace(stiffness=stiffness)
@@ -191,7 +191,7 @@ def _damped(rig: Rig, read: Read, springs: Mapping[str, HoldingSpring]) -> Itera
         if name not in read or not 0 < body.inertia < math.inf:
             continue
         damping = (rig.value(name) or 0.0) * (rig.area or 1.0)
-        inertia = body.inertia * stiffness / at_body  # referred to the end at which the stiffness is given
+        inertia = body.inertia * stiffness / at_body  # inertia referred to the end at which the stiffness is given
         critical = 2 * math.sqrt(inertia * stiffness)
         if damping > OVERDAMPED * critical:
             si, of = ("N m/rad", "N m s/rad") if body.turns else ("N/m", "N s/m")

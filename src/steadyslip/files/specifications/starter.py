@@ -25,7 +25,7 @@ EXAMPLES = {
 }  # fmt: skip
 """Example file of each other kind."""
 KINDS = ("rig", *EXAMPLES)
-_WIDE = 30  # columns of key and value before the comment
+_WIDE = 30  # width (characters) of key and value before the comment
 _HEAD = """# A rig to begin with: replace the numbers, then ask
 #     steadyslip analyze FILE
 # Text carries its unit; a tolerance may follow, such as "12 ± 20 % N/um". Lines that begin with # are what else may be
@@ -107,7 +107,10 @@ def _field(law: type[FrozenRecord], item: Field[Any], role: Declared) -> Iterato
 
 @cache
 def _usual_values() -> tuple[dict[str, str], dict[str, str], dict[str, list[str]]]:
-    """Values of a slow machine slide as TOML text by key; those of keys commented out; keys left out by law."""
+    """Values of a slow machine slide as TOML text by key, values of keys that are commented out, and keys left out.
+
+    The keys that are left out are listed by law.
+    """
     text = resources.files(__package__).joinpath("starter.toml").read_text(encoding="utf-8")
     usual, _, rest = text.partition("[suggested]")
     suggested, _, _ = rest.partition("[not_beside]")

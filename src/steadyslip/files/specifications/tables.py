@@ -29,7 +29,7 @@ from steadyslip.machine.input_units import TURNING
 from steadyslip.machine.rig import Rig
 from steadyslip.protocol.protocol import DISTURBANCE, Piece
 
-ONE_NAME = 0.8  # least similarity of a misspelt name to the one meant, as of azimut and azimuth
+ONE_NAME = 0.8  # least similarity of a misspelt name to the name that is meant, as of azimut and azimuth
 
 
 class TableReader:
@@ -53,7 +53,7 @@ class TableReader:
         self.problems.append(Problem(name, message))
 
     def record(self, family: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
-        """Record described by a table; None if there were problems, which are collected."""
+        """Record described by a table; None if there were problems, which are added to the reader's list."""
         if not has_choice(family):
             law, rest = family, table
         else:
@@ -71,9 +71,9 @@ class TableReader:
     def _left_unnamed(
         self, family: type[FrozenRecord], default: str, table: Table, prefix: str, able: Iterable[str] | None = None
     ) -> str:
-        """Report a table without law name whose keys are not of the default law; returns the first law with all keys.
+        """Report a table that names no law and has keys that the default law lacks; returns the first law with all.
 
-        Empty without such a law. With `able` only these laws are considered.
+        Returns an empty text if no law has all keys. If `able` is given, only the laws in it are considered.
         """
         keys = {name: {key_of(item) for item, _ in own_fields(law)} for name, law in family.registry.items()}
         foreign = [name for name in table if name not in keys[default]]
@@ -91,7 +91,7 @@ class TableReader:
         return known[0]
 
     def _complete(self, law: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
-        """Record of a known law; if some values are invalid, contradictions between the others are still reported."""
+        """Record of a known law; if some values are invalid, contradictions between the others are reported too."""
         before = len(self.problems)
         outer, self.twisted = self.twisted, self._twists(law, table)
         with self._own_area(law, table):
@@ -110,7 +110,7 @@ class TableReader:
         outer = self.area, self.in_totals
         if law.in_totals:
             self.area, self.in_totals = 1.0 if "area" in table else None, True
-            with suppress(ParameterError):  # a bad area is reported with the other keys; totals beside it are valid
+            with suppress(ParameterError):  # a wrong area is reported with the other keys; totals are valid
                 self.area = None if "area" not in table else Parameter("m^2", positive, "area").checked(table["area"])
         yield
         self.area, self.in_totals = outer
@@ -159,7 +159,7 @@ class TableReader:
         tables = {key: one for key, one in raw.items() if isinstance(one, dict)}
         for key, part in tables.items():
             if not all(isinstance(one, dict) for one in part.values()):
-                continue  # a table with values is not just a part of another
+                continue  # a table with values of its own is no part of another table
             larger = [one for one, rest in tables.items() if len(rest) > len(part) and not set(rest) & set(part)]
             if meant := next(iter(get_close_matches(key, larger, n=1, cutoff=ONE_NAME)), None):
                 keys = enumerated(list(part))
@@ -216,7 +216,7 @@ class TableReader:
             self.problem(prefix + legible(name), message + another)
             for item, role in own_fields(law):
                 if f"did you mean {key_of(item)!r}?" in message and item.name not in arguments:
-                    missing.pop(key_of(item), None)  # misspelt, so not missing
+                    missing.pop(key_of(item), None)  # the key is misspelt and not missing
                     if (meant := self._value(role, value, prefix + name)) is not None:
                         arguments[item.name] = meant
         self.problems += missing.values()
@@ -230,7 +230,7 @@ class TableReader:
             try:
                 find_law(role.family, name)
             except ParameterError:
-                continue  # an unknown key
+                continue  # the key is unknown
             table = rest.pop(name)
             if key in table:
                 self.problem(f"{prefix}{name}.{key}", "is not an option; the table is named after the result")
@@ -349,7 +349,7 @@ def _missing(role: Declared) -> str:
 
 
 def _stand_in(law: type[FrozenRecord], valid: Mapping[str, Any], others: Mapping[str, Any]) -> FrozenRecord:
-    """Record made without checks from `valid` values, for the rest `others` or defaults."""
+    """Record made without checks from the `valid` values; other fields get values from `others`, or defaults."""
     found = object.__new__(law)
     for item in fields(law):  # type: ignore[arg-type]
         default = None if is_required(item) else item.default
@@ -375,7 +375,7 @@ def _contradictions(law: type[FrozenRecord], valid: Mapping[str, Any], came_with
 
 
 def _key_of_another(law: type[FrozenRecord], name: str, value: Any) -> str:
-    """Hint on an unknown key: other laws of the family that have it, or the law that its value names."""
+    """Hint on an unknown key: other laws of the family that have this key, or the law named by its value."""
     bases = (base for base in law.__mro__ if issubclass(base, FrozenRecord) and base is not FrozenRecord)
     family = next((base for base in bases if has_choice(base) and law in base.registry.values()), None)
     if family is None:
@@ -389,7 +389,7 @@ def _key_of_another(law: type[FrozenRecord], name: str, value: Any) -> str:
 
 
 def _tables_with(name: str, sections: Iterable[Section]) -> str:
-    """Text of the tables of a file that have a key; empty if none has."""
+    """Text that lists the tables of a file in which a key is allowed; empty if there are none."""
     found = [
         f"[{path}]"
         for path, laws in _nested_tables(sections)
@@ -414,7 +414,7 @@ def _nested_tables(every: Iterable[Section]) -> Iterator[tuple[str, list[type[Fr
 
 
 def _part_of_another(family: type[FrozenRecord], name: object) -> str:
-    """Hint on an unknown law: a law of the family that has a part of this name."""
+    """Hint on an unknown law name: the law of the family that has a part with this name."""
     for word, law in family.registry.items():
         for item, role in own_fields(law):
             if isinstance(role, Part) and role.inline and isinstance(name, str) and name in role.family.registry:

@@ -27,8 +27,8 @@ _VALUE = re.compile(
 )
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*")
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
-_STEP = 1e-6  # relative change of the first number, of others multiples: small to stay valid, yet above rounding
-_ZERO_STEP = 1e-9  # change of the first number that is 0, in its unit; of others multiples
+_STEP = 1e-6  # relative change of the first number; other numbers change by multiples; small, yet above rounding
+_ZERO_STEP = 1e-9  # change of the first number that is 0, in its unit; other zeros change by multiples
 _SENTINEL = 1.2345678901e-211  # first of the placeholder values of omitted parameters; no rig has such numbers
 
 
@@ -159,7 +159,7 @@ def rig_template(text: str, rig: Slider | Machine, names: Sequence[str]) -> RigT
 
 
 def _slots(text: str) -> list[Slot]:
-    """All numbers in the text that are values of keys, bare or quoted with a unit."""
+    """Slots of all numbers in the text that are values of keys, without a unit or quoted with a unit."""
     found = []
     for match in _VALUE.finditer(text):
         if match["value"] is None:
@@ -178,9 +178,12 @@ def _slots(text: str) -> list[Slot]:
 
 
 def _slots_by_name(text: str, rig: Slider | Machine, slots: list[Slot], names: Iterable[str]) -> dict[str, Slot]:
-    """Slot of each parameter: the number whose share is that by which the parameter changes if all are changed."""
+    """Slot of each parameter, by name.
+
+    All numbers are changed by different shares; a parameter belongs to the number with the share by which it changes.
+    """
     other = _read(text, [(one, _changed_number(one, n)) for n, one in enumerate(slots)])
-    if other is None:  # a changed number is invalid: keep those that may be changed
+    if other is None:  # a changed number is invalid: keep the numbers that may be changed
         kept = [n for n, one in enumerate(slots) if _read(text, [(one, _changed_number(one, n))]) is not None]
         other = _read(text, [(slots[n], _changed_number(slots[n], n)) for n in kept])
     if other is None:
@@ -283,7 +286,7 @@ def _pieces(text: str, found: Mapping[str, Slot], tables: set[str]) -> tuple[tup
 
 
 def _is_read_back(found: RigTemplate, rig: Slider | Machine, names: Sequence[str]) -> bool:
-    """True if the template without values is read as `rig`, and with values as the rig with these values."""
+    """True if the unchanged template is read as `rig`, and the template filled with values as the rig with these."""
     if set(names) - set(found.sources) - set(found.omitted):
         return False
     addresses = rig.parameters()

@@ -35,7 +35,7 @@ class Adjustment(Displayed):
     Attributes
     ----------
     low, high : float or None
-        Limits of the value, SI units; None for those of the search.
+        Limits of the value, SI units; None to use the limits of the search.
     cost : float or None
         Cost of doubling or halving the value; other changes in proportion to their logarithm. None for the default, see
         `steadyslip.verdict.change_costs`.
@@ -169,7 +169,7 @@ class _Reader:
         for path, raw in self._table("adjust"):
             where = f"adjust.{path}"
             owner, _, key = path.rpartition(".")
-            if not isinstance(raw, dict) and self._known(owner):  # a misspelt key makes the table look like a parameter
+            if not isinstance(raw, dict) and self._known(owner):  # a misspelt key makes it look like a parameter
                 self._problem(where, unknown_name("key", key, _KEYS))
                 continue
             if not (name := self._name(path, where)):

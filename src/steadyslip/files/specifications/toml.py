@@ -1,4 +1,4 @@
-"""Parsing of TOML text within bounds, since crafted input could take the parser hours or overflow later.
+"""Parsing of TOML text within bounds, since crafted input could take the parser hours or cause overflow later.
 
 Also finds the line numbers of keys, for messages.
 """
@@ -115,7 +115,10 @@ def key_lines(text: str) -> dict[str, int]:
 
 
 def line_of(name: str, lines: dict[str, int]) -> int | None:
-    """Line number of a key; for a table without line that of its first key, else of the table around it; else None."""
+    """Line number of a key or table.
+
+    For a table without a line of its own, the line of its first key, or of the table around it; None if there is none.
+    """
     inside = [line for key, line in lines.items() if key.startswith(f"{name}.")]
     if name not in lines and inside:
         return min(inside)
@@ -127,7 +130,7 @@ def line_of(name: str, lines: dict[str, int]) -> int | None:
 
 
 def _header(line: str) -> tuple[str, bool] | None:
-    """Dotted name in a table header, and True if it begins a member of a list; None for other lines."""
+    """Dotted name in a table header, and True if the header begins a member of a list; None for other lines."""
     text = line.strip()
     listed = text.startswith("[[")
     opened, closed = ("[[", "]]") if listed else ("[", "]")

@@ -80,6 +80,6 @@ def intervals_of(
         raise RigFileError(problems, title=str(path))
     changed = set()
     for name, _ in map(named_value, changes):
-        with suppress(SteadyslipError):  # a change of another table
+        with suppress(SteadyslipError):  # the change concerns another table
             changed.add(rig.resolve(name))
     return {name: ends for name, ends in found.items() if name not in changed}

@@ -125,7 +125,7 @@ def table_text(
     """TOML text of a record; `own` are parameters by dotted name with the units that they have in this rig."""
     lines = [header, *first]
     if record.in_totals:
-        area = getattr(record, "area", None) or 1.0  # without an area in forces
+        area = getattr(record, "area", None) or 1.0  # a record without an area is in forces
     below: list[str] = []
     for item, role in own_fields(type(record)):
         value, key = getattr(record, item.name), key_of(item)
@@ -153,7 +153,7 @@ def table_text(
 
 
 def _members(family: type[FrozenRecord], members: Mapping[str, FrozenRecord], path: str) -> str:
-    """TOML text of members by name, a table each."""
+    """TOML text of members by name, with one table for each member."""
     blocks = []
     for name, one in members.items():
         first = []

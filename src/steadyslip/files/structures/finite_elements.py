@@ -30,7 +30,9 @@ class NamedMatrices(dict[str, Array]):
         self.freedoms = freedoms
 
     def without_held(self, path: str) -> NamedMatrices:
-        """Matrices without held degrees of freedom, and without massless ones, which follow the others without delay.
+        """Copy of the matrices without degrees of freedom that are held or have no mass.
+
+        Massless degrees of freedom are eliminated by static condensation.
 
         Raises
         ------
@@ -71,7 +73,7 @@ def abaqus_matrices(contents: Mapping[str, tuple[str, bytes]]) -> NamedMatrices:
     Raises
     ------
     UnreadableFile
-        If a line is not so, or a node is one of Abaqus's own (contact pairs and constraints as multipliers).
+        If a line has another form, or a node was made by Abaqus itself (contact pairs and constraints as multipliers).
     """
     entries = {letter: _lines(name, content) for letter, (name, content) in contents.items()}
     whole = np.concatenate([table[:, part] for table in entries.values() for part in (slice(0, 2), slice(2, 4))])
@@ -106,7 +108,7 @@ def calculix_matrices(name: str, names: bytes, contents: Mapping[str, tuple[str,
     Raises
     ------
     UnreadableFile
-        If a line is not so, or rows and names differ in number.
+        If a line has another form, or the numbers of rows and names differ.
     """
     freedoms = tuple(names.decode("ascii", "replace").split())
     found = {}
@@ -160,7 +162,7 @@ def nastran_matrices(path: str, file: Path, content: bytes) -> NamedMatrices:
 
 
 def _unfolded(frames: Mapping[str, Any]) -> tuple[tuple[str, ...], dict[str, Array]]:
-    """Names of degrees of freedom of all tables of DMIG, and their matrices over all these."""
+    """Names of the degrees of freedom of all DMIG tables, and the matrices over all these degrees of freedom."""
     pairs = sorted({pair for one in frames.values() for axis in (one.index, one.columns) for pair in axis})
     tables = {key: one.reindex(index=pairs, columns=pairs).fillna(0.0).to_numpy() for key, one in frames.items()}
     return tuple(f"{node}.{way}" if way else f"{node}" for node, way in pairs), tables
@@ -189,7 +191,7 @@ def _lines(name: str, content: bytes) -> Array:
 
 
 def _full(name: str, size: int, rows: Array, columns: Array, entries: Array) -> Array:
-    """Full matrix of entries; where they lie in one triangle it is symmetric."""
+    """Full matrix from its entries; if they all lie in one triangle, the matrix is taken as symmetric."""
     if size > MOST_FREEDOM:
         raise UnreadableFile(
             name, f"it has {size} degrees of freedom; allowed: up to {MOST_FREEDOM}; reduce the model in its program"

@@ -25,11 +25,11 @@ LETTERS = ("M", "K", "C", "G")
 """Names in files of the matrices of inertia, stiffness, damping and gyroscopic forces; C and G may be missing."""
 MOST_MATRICES = 4 * 8 * MOST_FREEDOM**2 + 2**20
 """Largest size of a file of matrices, bytes: four full ones in doubles."""
-_ANY = "*"  # stands for the letter, or Abaqus's word for it, in the names of files that hold one matrix each
+_ANY = "*"  # in file names: stands for the letter of a matrix, or Abaqus's word for it; each file has one matrix
 _WORDS = {"M": ("M", "MASS"), "K": ("K", "STIF"), "C": ("C", "DMPV"), "G": ("G",)}
 _CALCULIX = {"M": ".mas", "K": ".sti"}
 _FREEDOMS = "freedoms"  # variable of a NumPy file: names of the degrees of freedom
-_MARKET = b"%%MatrixMarket"  # how such a file begins
+_MARKET = b"%%MatrixMarket"  # first bytes of a Matrix Market file
 _SI = (1.0, 1.0, 1.0)  # m, kg and s over the units of length, mass and time of a file in SI units
 _ROTATIONS = (".4", ".5", ".6")  # directions of rotations in finite-element programs
 
@@ -107,7 +107,7 @@ def _from_matlab(path: str, folder: Path) -> NamedMatrices:
 
 
 def _from_text(path: str, folder: Path) -> NamedMatrices:
-    """Matrices of one file each, of Matrix Market or Abaqus."""
+    """Matrices that are in one file each, in the format of Matrix Market or Abaqus."""
     if _ANY not in Path(path).name:
         known = ", ".join("/".join(words) for words in _WORDS.values())
         raise UnreadableFile(path, f"one file holds one matrix; write {_ANY} where the names have {known}")

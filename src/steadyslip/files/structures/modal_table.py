@@ -87,7 +87,7 @@ def _numbers(path: str, header: list[str], rows: list[list[str]]) -> dict[str, A
 
 
 def _points(path: str, columns: dict[str, Array]) -> dict[str, tuple[Array | None, Array | None]]:
-    """Rows of displacements of the points, by name, along x and y."""
+    """Displacements of each point along x and y in the mode shapes, by name of the point; None where missing."""
     found: dict[str, list[Array | None]] = {}
     for name, shape in columns.items():
         point, _, axis = name.rpartition(".")

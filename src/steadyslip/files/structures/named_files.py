@@ -35,7 +35,7 @@ def _loaded(body: Any, folder: Path) -> Any:
     if not isinstance(body, dict):
         return body
     found, motion = dict(body), body.get("motion", body.get("kind"))
-    if isinstance(motion, str):  # `kind` is the former name of the key
+    if isinstance(motion, str):  # `kind` is an earlier name of this key
         found = {key: value for key, value in body.items() if key != "kind"} | {"motion": motion}
     if motion != StructureBody.name and (motion is not None or not _READERS.keys() & body.keys()):
         return found
@@ -45,7 +45,7 @@ def _loaded(body: Any, folder: Path) -> Any:
         if meant and isinstance(path, str):
             try:
                 if meant == "matrices" and "units" in found:
-                    with suppress(ParameterError):  # the field of the units refuses them
+                    with suppress(ParameterError):  # wrong units are reported by their own field
                         more = (unit_sizes(found["units"]),)
                 found[key] = _READERS[meant](path, folder, *more)
             except UnreadableFile as error:
@@ -56,7 +56,10 @@ def _loaded(body: Any, folder: Path) -> Any:
 
 
 def _meant(key: str) -> str | None:
-    """Key that names a file, even if it is misspelt: then only this is reported, not faults that follow from it."""
+    """Key of a file's name that `key` means, even if misspelt; None for other keys.
+
+    If it is misspelt, only the misspelling is reported, and no errors that follow from it.
+    """
     if key in {field.name for field in fields(StructureBody)}:
         return key if key in _READERS else None
     return next(iter(get_close_matches(key, _READERS, n=1)), None)

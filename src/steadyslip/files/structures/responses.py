@@ -26,15 +26,15 @@ Complex = NDArray[np.complex128]
 
 MOST_RESPONSES = 2**28
 """Largest size of a file of responses, bytes."""
-_ORDERS = {"m/N": 0, "m/s/N": 1, "m/s^2/N": 2}  # receptance, mobility and accelerance: derivatives of the displacement
-_TURNING = ("rad/(N m)", "m/(N m)", "rad/N")  # receptances of what turns
+_ORDERS = {"m/N": 0, "m/s/N": 1, "m/s^2/N": 2}  # orders of time derivative in receptance, mobility, accelerance
+_TURNING = ("rad/(N m)", "m/(N m)", "rad/N")  # units of receptances of parts that turn
 _RESPONSE, _COHERENCE = 4, 6  # types of functions in universal files
-_QUANTITIES = {8: "m", 11: "m/s", 12: "m/s^2"}  # types of data there: displacement, velocity, acceleration
-_AXES = {1: "x", 2: "y"}  # numbers of directions there
+_QUANTITIES = {8: "m", 11: "m/s", 12: "m/s^2"}  # types of data in universal files: displacement, velocity, acceleration
+_AXES = {1: "x", 2: "y"}  # numbers of directions in universal files
 _COLUMN = re.compile(r"(?P<out>\S+?\.[xy])/(?P<in>\S+?\.[xy]) +"
                      r"(?P<part>real|imag|magnitude|phase|coherence)(?: *\[(?P<unit>.+)\])?")  # fmt: skip
-_FIRST = {"imag": "real", "phase": "magnitude"}  # parts that complete others
-_SMOOTHED = 21  # frequencies over which the spread of a few repeats is averaged
+_FIRST = {"imag": "real", "phase": "magnitude"}  # parts of a complex number, with the part that each completes
+_SMOOTHED = 21  # number of neighbouring frequencies over which the scatter of a few repeats is averaged
 
 
 @dataclass
@@ -85,12 +85,12 @@ def read_response(path: str, folder: Path, averages: int) -> ResponseData:
         if one.repeats:
             at = slice(None), names.index(out), names.index(into)
             mean[at], deviation[at] = _mean(path, one, averages)
-    usable = ~np.any(np.isinf(mean.real), axis=(1, 2))  # no displacement follows from an acceleration at zero frequency
+    usable = ~np.any(np.isinf(mean.real), axis=(1, 2))  # at frequency 0 acceleration gives no displacement
     return ResponseData(2 * np.pi * hertz[usable], mean[usable], deviation[usable], names, path)
 
 
 def _mean(path: str, one: _Measured, averages: int) -> tuple[Complex, Array]:
-    """Mean of the repeats, and the standard deviation of its complex error: from repeats, else from the coherence."""
+    """Mean of the repeats, and standard deviation of its complex error, from the repeats or else the coherence."""
     mean = np.mean(one.repeats, axis=0)
     count = len(one.repeats)
     if count > 1:
@@ -108,7 +108,7 @@ def _mean(path: str, one: _Measured, averages: int) -> tuple[Complex, Array]:
 
 
 def _receptance(path: str, hertz: Array, values: Complex, name: str) -> Complex:
-    """Receptances (m/N) from responses in a unit; infinite where the frequency is zero and it was no displacement."""
+    """Receptances (m/N) from measured responses; infinite at frequency zero, except for measured displacements."""
     if not name:
         example = "tip.x/tip.y real [m/s^2/N]"
         raise UnreadableFile(path, f"a response has no unit; write it as in {example!r}; allowed: {', '.join(_ORDERS)}")
@@ -223,7 +223,7 @@ def _from_universal(path: str, folder: Path) -> tuple[Array, dict[tuple[str, str
         from pyuff import UFF
     except ImportError as error:
         raise UnreadableFile(path, "universal files need the package pyuff; install steadyslip[lab]") from error
-    read_bytes(folder / path, MOST_RESPONSES)  # that it is a file of bounded size
+    read_bytes(folder / path, MOST_RESPONSES)  # checks that it is a file of bounded size
     try:
         sets = UFF(str(folder / path)).read_sets()
         sets = sets if isinstance(sets, list) else [sets]
@@ -270,7 +270,7 @@ def _functions(path: str, sets: list[Any], scale: Any) -> Iterator[tuple[tuple[s
 
 
 def _unit_of(path: str, one: Any, scale: Any) -> str:
-    """Unit of a function: by its labels, else that of its type of data in SI units."""
+    """Unit of a function, from its labels, or else the SI unit of its type of data."""
     quantity = _QUANTITIES.get(int(one["ordinate_spec_data_type"]))
     labels = [str(one[f"{name}_axis_units_lab"]).strip().strip("()") for name in ("ordinate", "orddenom")]
     above, below = ("" if label in ("NONE", "") else label for label in labels)

@@ -1,4 +1,4 @@
-"""Text of tables of modes and responses, whatever stands between their columns."""
+"""Text of tables of modes and responses, whichever separator stands between their columns."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _FREQUENCY = re.compile(r"frequency(?: *[\[(](?P<unit>[^\])]+)[\])])?")
 
 
 def table_text(path: str, folder: Path, most: int) -> str:
-    """Text of a table as if commas stood between its columns, with decimal points.
+    """Text of a table, converted to commas between columns and decimal points.
 
-    Spreadsheets of countries with decimal commas write semicolons, others tabs: the first line tells.
+    Some spreadsheets write semicolons and decimal commas, others tabs; the first line shows which.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def hertz_of(path: str, name: str) -> float | None:
     Raises
     ------
     UnreadableFile
-        If its unit is none of a frequency.
+        If its unit is not a unit of frequency.
     """
     if (match := _FREQUENCY.fullmatch(name)) is None:
         return None

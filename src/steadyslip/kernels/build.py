@@ -64,17 +64,18 @@ ENTRIES: dict[str, tuple[ModuleType, tuple[str, ...]]] = {
          _REALS, _TABLE, "int"),
     ),
 }  # fmt: skip
-"""Functions of the driver that Python calls: module, and types of their arguments after layout and routines."""
+"""Functions of the driver that Python calls: module, and types of the arguments that follow layout and routines."""
 DRIVERS = {"driver": ("advance", "observe", "field", "through_table"), "held": ("bristle_step", "follow_held")}
-"""Groups of `ENTRIES` that are compiled together, by file name; a motion does not need the group for held rigs."""
+"""Groups of `ENTRIES` that are compiled together, by file name; only rigs that hold a place need the group `held`."""
 KERNEL = FileKind("kernel", 4, 2**26, "it is compiled again")
 _FALSE_WORDS = ("", "0", "no", "off", "false")  # values of an environment variable that mean no
-_KEY_PLACEHOLDER = "THIS"  # placeholder for the key in the routines' text
+_KEY_PLACEHOLDER = "THIS"  # stands in the routines' text for the key, which is a hash of this text
 _lock = threading.RLock()
 _drivers: dict[str, Callable[..., int]] = {}
 _loaded: dict[str, dict[str, int]] = {}
 _NATIVE = [f"printers.native.{part}" for part in ("functions", "expressions", "lines", "arrays")]
-_TRANSLATION = ("layout", "driver_text", "linking", *_NATIVE)  # modules that translate the driver: part of its key
+# modules that translate the driver; their text is a part of its key
+_TRANSLATION = ("layout", "driver_text", "linking", *_NATIVE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +206,7 @@ class _CachedFile:
         try:
             self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             if "STEADYSLIP_CACHE" not in os.environ:
-                self.path.parent.chmod(0o700)  # earlier versions left it to the umask
+                self.path.parent.chmod(0o700)  # earlier versions of this package did not set the permissions
             write_sealed(self.path, content, KERNEL, self.path.name, private=True)
         except OSError as error:
             _warn_of(self.path.parent, _reason(error))
@@ -272,7 +273,10 @@ def cached_or_compiled(
 
 
 def driver(name: str) -> Callable[..., int]:
-    """Machine code of one of `ENTRIES` as a Python function of layout, addresses of routines (arrays), and the rest."""
+    """One of `ENTRIES`, in machine code, as a Python function.
+
+    Its first arguments are arrays: the layout, and the addresses of the routines.
+    """
     with _lock:
         if name not in _drivers:
             (group,) = (one for one, names in DRIVERS.items() if name in names)

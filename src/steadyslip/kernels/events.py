@@ -14,10 +14,11 @@ from typing import Any
 from steadyslip.kernels.layout import Out, Row
 from steadyslip.kernels.nodes import larger
 
-FASTER = 1.000001  # least ratio of slip to load-point speed, so that rounding at equal speeds causes no event
+# a contact slips if its speed exceeds that of the load point by this factor (rounding at equal speeds)
+FASTER = 1.000001
 ROUNDED = 64 * 2.0**-52
-"""Relative rounding error of the velocity: that of a sum of stresses (dozens of aσ), over aσ, the stress per unit of
-ln v."""
+"""Relative rounding error of the velocity: the rounding error of a sum of stresses (dozens of aσ) over aσ, which is the
+change of stress per unit of ln v."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,6 @@ LOG_KINDS = ("", *(word for event in EVENTS for word in (event.falls, event.rise
 COUNTED = tuple(word for event in EVENTS for word in (event.falls_counted, event.rises_counted))
 """Names of the event counts, by kind, that follow the statistics of `Row`; unnamed counts are not reported."""
 RING = "ring"
-"""Name of ringing, forward slip after a slip event that is no event; in a log, a begin of slip with number 0."""
+"""Name of ringing: forward slip that follows a slip event and does not count as one; in a log its number is 0."""
 TALLY = (*(row.name.lower() for row in Row if Row.EVENTS <= row <= Row.PEAK_GROWTH), *COUNTED)
 """Columns of the event statistics in results."""

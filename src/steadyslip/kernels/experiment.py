@@ -139,13 +139,16 @@ class LockstepKernel(Formulation):
         return record.program
 
     def input_rates(self) -> tuple[int, ...]:
-        """Index among the constants of each input's rate of change, direction by direction; -1 for inputs without."""
+        """For each direction and input, the index among the constants of the input's rate of change.
+
+        -1 if it has none.
+        """
         order = {pair: len(self.constants.symbols) + i for i, pair in enumerate(self.constants.rates)}
         directions = range(len(self.reduction.directions))
         return tuple(order.get((c, d), -1) for d in directions for c in self.varied_inputs)
 
 
-LANES = 8  # one vector of doubles: sensitivities fill the registers, so that more lanes would not fit
+LANES = 8  # number of lanes: one vector of doubles; sensitivities fill the processor's registers, so no more fit
 
 
 @dataclass(frozen=True, eq=False)

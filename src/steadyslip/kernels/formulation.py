@@ -31,7 +31,7 @@ OUTPUTS = ("v", "acceleration", "sigma", "tau", "T")
 
 @dataclass(frozen=True)
 class Choice:
-    """Options for which a kernel is compiled.
+    """Options of a kernel, which decide what code is compiled.
 
     Attributes
     ----------
@@ -68,7 +68,8 @@ class Formulation:
         output, whose rates at the end of a step have an error that is corrected (`steadyslip.kernels.step`).
     """
 
-    varied_inputs: tuple[sp.Symbol, ...] = (V_LP,)  # inputs with rates of change; the steady drive is a constant too
+    # inputs that may change with the varied parameters, as the velocity of the drive does
+    varied_inputs: tuple[sp.Symbol, ...] = (V_LP,)
 
     def __init__(self, reduction: Reduction, choice: Choice) -> None:
         self.reduction, self.choice = reduction, choice
@@ -130,7 +131,7 @@ class Formulation:
         return explicit(expression) + self._solved.followed(expression, list(map(explicit, self._solved.residuals)))
 
     def _entry(self, matrix: list[list[sp.Expr]], i: int, k: int) -> sp.Expr:
-        """Entry (i, k) of the Jacobian, with the terms due to changing constants."""
+        """Entry (i, k) of the Jacobian, including the terms due to changing constants."""
         entry = matrix[i][k]
         entry = entry if entry is sp.S.Zero else self._with_constants(entry)
         if i not in self.driven:
@@ -286,7 +287,7 @@ def with_short_chains(expressions: Iterable[sp.Expr], variables: Iterable[sp.Sym
 
 
 def _innermost(expressions: Iterable[sp.Expr], late: frozenset[sp.Symbol]) -> sp.Expr | None:
-    """First function found that depends on `late` symbols, innermost first; None if there is none."""
+    """A function in the expressions that depends on `late` symbols, innermost first; None if there is none."""
     for expression in expressions:
         for node in sp.postorder_traversal(expression):
             is_slow = isinstance(node, sp.Function) and not isinstance(node, (AppliedUndef, sp.Piecewise))
@@ -318,7 +319,7 @@ class _Collector:
         return e.func(*map(self.collected, e.args))
 
     def linear(self, e: sp.Basic) -> tuple[sp.Expr, sp.Expr] | None:
-        """(A, B) with e = A s + B; None if e is not linear in s (cached)."""
+        """Pair (A, B) with e = A s + B; None if e is not linear in s (cached)."""
         if e not in self._known:
             self._known[e] = self._linear(e)
         return self._known[e]

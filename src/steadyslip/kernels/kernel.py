@@ -113,7 +113,7 @@ class Kernel(Formulation):
         return record.program
 
     def _balance_program(self) -> Program:
-        """Program of the balances after a jump: values, derivatives in their own w, and Newton's changes of all w.
+        """Program of the balances after a jump: values, derivatives by their velocity variable, and Newton's changes.
 
         If there is no balance to solve, the velocity is continuous, and the program writes a dummy balance of zero.
         """
@@ -177,7 +177,7 @@ class Kernel(Formulation):
             program.store(self.layout.continuous + reduction.continuous.index(symbol), value)
 
     def _let_go(self, record: Evaluator) -> None:
-        """Update the held force of a drive that is released or attached, from the state before it."""
+        """Update the held force of a drive that is released or attached, from the state before the change."""
         program, (held,) = record.program, self.reduction.model.held
         names = {symbol: f"in{i}" for i, symbol in enumerate(self.reduction.channels)}
         free, switch = (names[self.reduction.channels[place]] for place in (FREE, SWITCH))

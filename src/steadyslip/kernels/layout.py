@@ -23,7 +23,7 @@ class Row(IntEnum):
     V, ACCELERATION, SIGMA = 0, 1, 2
     """Outputs at the end of the step."""
     Z, Z_SCALE = 3, 4
-    """First unknown of the balances (or guess of it), and its scale."""
+    """First unknown of the balances (or a guess of it), and the scale of this unknown."""
     TAU, H, LENGTH = 5, 6, 7
     """Time since the start of the segment, size of the next step, length of the segment (s)."""
     START, STOP, SEGMENT = 8, 9, 10
@@ -34,7 +34,8 @@ class Row(IntEnum):
     ACCEPTED, REJECTED, FAILURES, ERROR = 15, 16, 17, 18
     """Numbers of accepted steps, of rejected steps, and of rejected steps in a row; ln of the last squared error."""
     MOST_STEPS, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 19, 20, 21, 22, 23, 24
-    """Settings: most steps, limits of velocity (m/s) and normal stress (Pa); flags: watch events, record steps."""
+    """Settings: most steps, limits of velocity (m/s) and of normal stress (Pa). Flags: watch events, record
+    steps."""
     NEXT_TIME, NEXT_SAMPLE = 25, 26
     """Local time of the next requested sample (s), and its number."""
     V_DRIVE, LOG = 27, 28

@@ -93,7 +93,9 @@ def machine_code(text: str, effort: int = SPEED) -> bytes:
     module = llvm.parse_assembly(_head(machine) + text)
     module.verify()
     options = llvm.create_pipeline_tuning_options(speed_level=effort)
-    # code that must be fast has no loops or is vector code; optimising the driver's loops would double compile time
+    # loops are not optimised: fast code has none or is vector code, and for the driver's loops it would double compile
+    # time
+
     options.loop_unrolling = options.loop_vectorization = options.loop_interleaving = False
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)

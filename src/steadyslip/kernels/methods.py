@@ -17,7 +17,7 @@ import numpy as np
 from steadyslip.kernels import dop853 as table
 
 Tree = tuple["Tree", ...]
-_ROUNDING = 2e-9  # largest defect of an order condition: coefficients are published with ten digits or more
+_ROUNDING = 2e-9  # largest accepted violation of an order condition; coefficients are published with ten digits or more
 
 
 @cache

@@ -8,7 +8,7 @@ from steadyslip.core.errors import InternalError
 from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.nodes import Loop, Node, Value, as_node, larger, select, smaller
 
-NEWTON_STEPS = 6  # iterations, starting from the last stage's solution; chosen by trial: each evaluates the residuals
+NEWTON_STEPS = 6  # number of iterations from the solution at the last stage; by trial: each evaluates the residuals
 MAX_LOG_STEP = 2.0  # largest change of ln v (or asinh v) in one iteration; chosen by trial to prevent overshoot
 
 RTOL, ATOL = 1e-7, 1e-9  # converged if the last change is below RTOL |z| + ATOL scale; the error is near its square

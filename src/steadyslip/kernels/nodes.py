@@ -83,7 +83,7 @@ Value = Node | float
 
 
 def as_node(value: Any, kind: str = "real") -> Node:
-    """Convert a number to a node; nodes are unchanged."""
+    """Node of a number; a node is returned unchanged."""
     if isinstance(value, Node):
         return value
     return Node("number", (int(value) if kind == "int" else bool(value) if kind == "bool" else float(value),), kind)
@@ -164,7 +164,7 @@ class Loop:
 
 
 def reachable(ends: Iterable[Node]) -> list[Node]:
-    """Nodes in `ends` and all nodes on which they depend, in order of definition, without nodes inside loops."""
+    """Nodes in `ends` and all nodes on which they depend, in order of definition; nodes inside loops are left out."""
     found: dict[int, Node] = {}
     waiting = list(ends)
     while waiting:

@@ -45,7 +45,7 @@ def real(i: Any) -> Any:
     if isinstance(i, Node):
         return Node("real", (i,))
     number = _DOUBLE.unpack(_LONG.pack((i + 2**63) % 2**64 - 2**63))[0]
-    return np.float64(number)  # NumPy's float, so that division by zero gives infinity as in machine code
+    return np.float64(number)  # a NumPy float, whose division by zero gives infinity as in machine code
 
 
 def _quick(x: Any) -> Any:

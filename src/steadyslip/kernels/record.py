@@ -182,7 +182,8 @@ class Evaluator:
     # -- events
 
     def shares(self, contact: int) -> list[Value]:
-        """Ratios of a contact in steady sliding: slip rate to the drive's, slip rate and σ to the first contact's."""
+        """Ratios for a contact in steady sliding: slip rate over the drive's, slip rate and σ over the first
+        contact's."""
         return self.kernel.shares(self.constants)[3 * contact : 3 * contact + 3]
 
     def moment(self, point: Values, found: Sequence[Value], h: Value = 1.0, contact: int = 0) -> Observed:

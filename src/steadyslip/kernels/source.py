@@ -190,7 +190,7 @@ class _Evaluation:
         return total
 
     def _term(self, e: Any) -> tuple[bool, Any]:
-        """(True if the term is to be subtracted, value without the sign)."""
+        """True if a term is to be subtracted, and its value without the sign."""
         if e.is_Number and e.is_negative:
             return True, float(-e)
         return self._product(e) if e.is_Mul and self.count[e] == 1 else (False, self.value(e))

@@ -15,17 +15,18 @@ from steadyslip.kernels.record import Evaluator, Values, times, total
 from steadyslip.kernels.rosenbrock import factorised, substituted
 from steadyslip.kernels.source import Formulas
 
-INSTANT = 1e-13  # a step shorter than this share of the time so far (500 roundings) that changes no state: no progress
-UNCHANGED = 1e-9  # a state changes if it moves by more than this share of its absolute tolerance
+INSTANT = 1e-13  # a step makes no progress if it is shorter than this share of the time so far and changes no state
+UNCHANGED = 1e-9  # a state variable counts as changed if it moves by more than this share of its absolute tolerance
 LOG_SAFETY = math.log(0.5)
-"""ln of the next step over the longest step that the error allows. With 0.5 hardly any step is rejected, and the error
-after tens of cycles is near rtol."""
+"""ln of the ratio of the next step to the longest step that the error allows. With a ratio of 0.5 hardly any step is
+rejected, and the error after tens of cycles is near rtol."""
 LAST_ERROR_WEIGHT, EARLIER_ERROR_WEIGHT = 0.7, 0.3
-"""Weights of the last two errors in step control. Without the second, steps that are limited by stability oscillate
-about the limit, and every sixth is rejected."""
+"""Weights of the last error and of the error before in step control. Without the second weight, steps that stability
+limits oscillate about the limit, and every sixth step is rejected."""
 SHRINK, GROW = 0.2, 6.0  # limits of the ratio of a step to the previous one; usual values (DOP853: 1/3, 6)
-LOWEST_TREND = -3.0  # lower limit of ln e² - goal in the trend of errors; chosen by trial
-INITIAL_SHARE = 1e-3  # at a segment's start an event function has a sign beyond this share of the allowed error
+LOWEST_TREND = -3.0  # lower limit of ln e² minus its goal, when the next error is extrapolated; chosen by trial
+# at the start of a segment, share of the allowed error above which the sign of an event function is known
+INITIAL_SHARE = 1e-3
 LOG_SAFETY_REJECTED = math.log(0.8)  # as LOG_SAFETY, after a rejected step; chosen by trial
 
 
@@ -62,7 +63,7 @@ class Step(Evaluator):
         self.size = primitive("rough_log", smaller(larger(error, 1e-10), 1e30))
         self.earlier = self.program.load(Row.ERROR)
         factor = exp(select(self.good, self._log_growth(), LOG_SAFETY_REJECTED - 0.5 / method.order * self.size))
-        factor = select(error < 1e60, smaller(larger(factor, SHRINK), GROW), SHRINK)  # also where the error is NaN
+        factor = select(error < 1e60, smaller(larger(factor, SHRINK), GROW), SHRINK)  # SHRINK also if the error is NaN
         self.after = select(self.last, self.end, self.tau + self.h)
         next_h = self.h * factor
         self.next_h = select(self.last & self.good, larger(self.proposed, next_h), next_h)
@@ -271,7 +272,7 @@ class Step(Evaluator):
         return replace(moment, error=self.rtol * size, rounding=rounding)
 
     def store_state(self) -> None:
-        """Write the stores of the new state and its rates if the step is accepted, else of the old ones."""
+        """Write the stores of the new state and its rates if the step is accepted, else of the old state and rates."""
         layout, store, good = self.kernel.layout, self.program.store, self.good
         for i in range(self.kernel.size):
             store(layout.state + i, select(good, self.new[i], self.old[i]))

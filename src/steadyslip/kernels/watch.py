@@ -14,7 +14,7 @@ from steadyslip.kernels.record import Evaluator, horner, slope_of
 from steadyslip.kernels.source import Formulas
 
 ROUNDS = 2  # iterations of Halley's method (cubic convergence), started at the root of the secant
-FOUND = 3e-4  # largest last change of a root, as share of the step; the error is then near its cube, 3e-11
+FOUND = 3e-4  # a root is found if its last change is smaller, as share of the step; its error is then near 3e-11
 
 
 class Watch(Evaluator):
@@ -105,7 +105,7 @@ class Watch(Evaluator):
         self._kept(Row.LAST_PEAK_TIME, peak, self.time)
 
     def _size(self) -> Node:
-        """ln of the ratio of velocity to load-point velocity; infinite if the latter is zero."""
+        """ln of the ratio of velocity to load-point velocity; infinite if the load point rests."""
         kernel, v_lp = self.kernel, as_node(self.v_lp)
         size: Value = log(abs(as_node(self.v) / v_lp))
         if kernel.reduction.velocity == "logarithm" and kernel.choice.level == "constant":
@@ -114,7 +114,7 @@ class Watch(Evaluator):
         return found
 
     def _slip(self) -> None:
-        """Write the update of slip in progress: its begin, its mark as fast at a peak, and its end if it was slow."""
+        """Write the update of slip in progress: its begin, whether it is fast at a peak, and its end if it was slow."""
         load, here = self.program.load, self.here
         anew = self.trough & (self.now_event <= 0.0) & (as_node(self.v) < self.now_from)
         anew = here & (self.begins | (anew & (self.now_from < float("inf"))))

@@ -8,12 +8,14 @@ from steadyslip.core.arrays import Array
 from steadyslip.kernels.driver.places import guess_at, scale_at
 from steadyslip.kernels.layout import Layout, Routines, call
 
-FIRST_REACH = 0.01  # first step in search of a bracket, over the scale of w; by trial: larger ones may skip a root
+# first step in the search for a bracket, over the scale of w; by trial: larger steps may skip a root
+FIRST_REACH = 0.01
 ROUNDS = 300  # most sweeps over coupled balances; chosen by trial
-MOST_TRIALS = 200  # most steps to a bracket, and in it: doubling reaches 1e58 scales, bisection ends after some 60
+MOST_TRIALS = 200  # most steps to find a bracket, which doubling widens to 1e58 scales, and most steps inside it
 SETTLED = 1e-14  # relative change of the unknowns in a sweep below which it has converged: some tens of roundings
-NEWTON_STEPS = 50  # most Newton steps for all balances; each at least halves the last, so that 37 reach ROUNDED from 1
-ROUNDED = 1e-11  # relative change of an unknown that rounding of the balances may cause; smaller ones: converged
+# most steps of Newton's method for all balances; steps at least halve, so that 37 lead from 1 to ROUNDED
+NEWTON_STEPS = 50
+ROUNDED = 1e-11  # relative change of the unknowns below which Newton's method has converged: rounding of the balances
 
 
 def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> bool:
@@ -39,7 +41,7 @@ def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> bo
 
 
 def solve_together(R: Array, layout: Layout, routines: Routines, y: Array) -> bool:
-    """Newton's method for all balances, as long as each step is at most half the last; True if it has converged.
+    """Newton's method for all balances, continued while each step is at most half the last; True if it converges.
 
     Otherwise the guesses in the record are restored.
     """

@@ -167,7 +167,8 @@ def take_step(
         elif error > 0.0:
             factor = min(LONGER, max(SHORTER, SAFETY * error**-0.2))  # the error is of fifth order
         if error <= 1.0:
-            if length < most or factor < 1.0:  # a step cut to `most` is no guide to the length of the next one
+            # the error of a step that was cut to `most` says little about the next length
+            if length < most or factor < 1.0:
                 clock[Held.LENGTH] = length * factor
             return length
         length = length * factor

@@ -16,19 +16,19 @@ from steadyslip.kernels.driver.bristles import Bristles, Space, take_step
 from steadyslip.kernels.layout import Control, Held, Layout, Routines, Turn
 
 NODES = 33  # number of evenly spaced points of a step or passage at which its values are evaluated
-SAME = 1e-9  # share of a sample time within which two lengths are equal: rounding of times after a million samples
-RESTED = 0.002  # shortest time between rows at rest, as share of the rest so far; the force grows evenly meanwhile
-WHOLE = 6755399441055744.0  # 1.5 * 2**52: adding and subtracting it rounds to an integer, halves to even
+SAME = 1e-9  # two lengths of time are equal if they differ by less than this share of a sample time (rounding)
+RESTED = 0.002  # shortest time between stored rows at rest, over the duration of the rest; the force then grows evenly
+WHOLE = 6755399441055744.0  # 1.5 * 2**52: adding and then subtracting it rounds a float to an integer, halves to even
 
 
 def rounded_to(value: float, step: float) -> float:
-    """Nearest multiple of a step."""
+    """Multiple of `step` that is nearest to a value."""
     count = value / step
     return float(step * (count + WHOLE - WHOLE)) if abs(count) < 2.0**51 else value
 
 
 def beyond_band(error: float, band: float) -> float:
-    """Error counted from the nearer end of the dead band; 0 within the band."""
+    """Error minus the nearer end of the dead band; 0 within the band."""
     return error - band if error > band else error + band if error < -band else 0.0
 
 
@@ -101,7 +101,10 @@ def next_instant(control: Array, late: Array) -> float:
 
 
 def least_of(row: Array, way: int) -> float:
-    """Minimum, refined by a parabola, of values at evenly spaced nodes, of -values (`way` 1) or -|values| (`way` 2)."""
+    """Minimum of values at evenly spaced nodes, refined by a parabola.
+
+    Of −values if `way` is 1, of −|values| if it is 2.
+    """
     best, least = 0, math.inf
     for i in range(NODES):
         value = row[i] if way == 0 else -row[i] if way == 1 else -abs(row[i])

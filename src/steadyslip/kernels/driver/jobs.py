@@ -217,7 +217,7 @@ def serve_lane(
         R[Row.FLAG] = 0.0
         if status == Status.RUNNING:
             return
-        if status == Status.NO_VELOCITY:  # there is no state after the jump, by which the contact may have lifted off
+        if status == Status.NO_VELOCITY:  # no state exists after the jump, as the contact may have lifted off
             if lowest_stress(R, layout) <= R[Row.SIGMA_LOW]:
                 status = Status.CONTACT_LOST
         else:
@@ -236,6 +236,6 @@ def serve_lane(
     cursor[Cursor.BUSY] -= 1
     for i in range(layout.rows):
         R[i] = 0.0
-    R[Row.RTOL] = 1.0  # an idle lane takes steps with the others: these keep its numbers finite
+    R[Row.RTOL] = 1.0  # a lane without job takes steps like the other lanes; these settings keep its numbers finite
     R[Row.H] = 1e-3
     R[Row.LENGTH] = 1e300

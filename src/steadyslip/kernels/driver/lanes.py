@@ -10,7 +10,7 @@ from steadyslip.kernels.driver.places import output_size
 from steadyslip.kernels.driver.samples import BETWEEN
 from steadyslip.kernels.layout import GROUP, Cursor, Layout, Routines, Row, Setting, call
 
-LOGGED_AT_ONCE = 20  # most rows that `serve_lane` may add to the log, per contact: two for each kind of event
+LOGGED_AT_ONCE = 20  # most rows per contact that one call of `serve_lane` may add to the log: two per kind of event
 
 
 def flagged(S: Array, lanes: int) -> int:

@@ -55,7 +55,7 @@ def tally_at(layout: Layout, contact: int) -> int:
 
 
 def slip_sense(R: Array, layout: Layout, contact: int) -> float:
-    """1 or -1 if a contact slips forward or backward faster than the load point at the end of the step, else 0."""
+    """1 or -1 if a contact slips forward or backward faster than the load point at the end of the step; else 0."""
     first = layout.event_value + events_per_contact(layout) * contact
     if R[first + EventPlace.SLIP] > 0.0:
         return 1.0

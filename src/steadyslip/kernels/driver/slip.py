@@ -87,10 +87,10 @@ def begin_event(R: Array, layout: Layout, contact: int, log: Array, cursor: Arra
 
 
 def goes_on_after_knock(R: Array, layout: Layout, contact: int, tau: float, drop: float) -> bool:
-    """True if small forward slip is stick-slip, not ringing: `ALIKE` similar stress drops in a row, each after a rest.
+    """True if small forward slips count as stick-slip: `ALIKE` similar stress drops in a row, each after a rest.
 
     After a knock, or a fast stroke of the drive, the drops of ordinary stick-slip may be below EVENT_SHARE of the first
-    drop. Ringing has no rests, and its drops decrease. If True, the drop becomes the largest.
+    drop. Ringing has no rests, and its drops decrease. If True, `drop` is stored as the largest stress drop.
     """
     own = tally_at(layout, contact)
     begin, before = R[own + Row.NOW_BEGIN], R[own + Row.SMALL_DROP]
@@ -180,7 +180,7 @@ def record_event(R: Array, layout: Layout, number: int, tau: float, y: Array, lo
         if kind == fastest:
             mark_fast(R, layout, contact, y)
         elif R[own + Row.NOW_EVENT] == 0.0 and speed < R[own + Row.NOW_FROM] < math.inf:
-            track_slowest(R, layout, contact, speed, tau, y)  # slip so far was too slow for an event
+            track_slowest(R, layout, contact, speed, tau, y)  # the slip was too slow for an event so far
 
 
 def record_peak(R: Array, layout: Layout, contact: int, time: float, y: Array) -> None:

@@ -16,11 +16,11 @@ from steadyslip.kernels.driver.jobs import exhausted, load_job
 from steadyslip.kernels.driver.segments import begin_segment
 from steadyslip.kernels.layout import Layout, Routines, Row, Status, call
 
-INSTANT = 1e-14  # shortest step over the row's length, about 50 roundings of time; a motion that needs less runs away
+INSTANT = 1e-14  # shortest step over the length of the row, about 50 roundings of time; shorter ones mean blow-up
 
 
 def lanes_of_job(layout: Layout, count: int, lane: int) -> int:
-    """Number of lanes, this one included, that integrate the job of a lane if there are `count` jobs."""
+    """Number of lanes that integrate the same job as the given lane, if there are `count` jobs."""
     return (layout.lanes - 1 - lane % count) // count + 1
 
 

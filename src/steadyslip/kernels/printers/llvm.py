@@ -114,7 +114,7 @@ class _Writer:
         return f"{head}{aligned} {{\nentry:\n{body}\n  ret void\n}}"
 
     def emit(self, nodes: Sequence[Node], loop: Loop | None = None) -> None:
-        """Write all nodes that belong to a loop, or for None those outside loops."""
+        """Write those of the nodes that belong to `loop`, or, if it is None, those outside loops."""
         for node in nodes:
             if node.order in self.values or node.loop is not loop:
                 continue

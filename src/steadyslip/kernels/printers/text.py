@@ -10,7 +10,7 @@ from steadyslip.kernels.nodes import Loop, Node, Program, reachable
 
 _SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
 _SUMS, _PRODUCTS = frozenset(("add", "sub")), frozenset(("mul", "div"))
-_DEEPEST = 8  # most nested operations in one line, for readability
+_DEEPEST = 8  # most operations nested in one expression of a line, so that lines stay readable
 
 
 class Writer(ABC):
@@ -97,7 +97,7 @@ class Writer(ABC):
         self.lines.append("    " * level + statement + "\n")
 
     def emit(self, nodes: Sequence[Node], level: int, loop: Loop | None = None) -> None:
-        """Write all nodes that belong to a loop, or for None those outside loops."""
+        """Write those of the nodes that belong to `loop`, or, if it is None, those outside loops."""
         for node in nodes:
             if node.order in self.known or node.loop is not loop:
                 continue
@@ -135,7 +135,7 @@ class Writer(ABC):
         return self.known[node.order][1:-1] if node.order in self.signs else self.known[node.order]
 
     def _beside(self, node: Node) -> tuple[str, str]:
-        """Expressions of both operands, without brackets that are not needed for the order of operations."""
+        """Expressions of both operands; brackets are kept only where the order of operations needs them."""
         signs = [self.signs.get(operand.order, "") for operand in node.operands]
         product, compares = node.op in _PRODUCTS, node.op not in _SUMS | _PRODUCTS
         spare = _PRODUCTS if product else _SUMS | _PRODUCTS, _SUMS | _PRODUCTS if compares else _PRODUCTS

@@ -112,7 +112,7 @@ class Expressions:
         return real(value) if isinstance(value, float) else Scalar("int", str(int(value)))
 
     def _as(self, node: ast.AST, value: Operand, kind: str) -> Scalar:
-        """Value converted to a kind (real, int, bool); raises an error if that is not possible."""
+        """Value converted to a `kind` (real, int, bool); an error is raised if that is not possible."""
         found = self.lines.converted(value, kind) if isinstance(value, Scalar) else None
         if found is None:
             raise self.refuse(node, f"{ast.unparse(node) if isinstance(node, ast.expr) else 'what it gets'} as {kind}")

@@ -66,7 +66,7 @@ def display_area(unit_name: str, area: float | None) -> float | None:
 
 @lru_cache(maxsize=256)
 def _families(names: frozenset[str]) -> tuple[frozenset[Dimension], frozenset[Dimension]]:
-    """Dimensions among the named units, in two sets: areas and quantities per area; totals."""
+    """Dimensions of the named units as two sets: areas and quantities per area; totals."""
     found = {unit(name)[1] for name in names}
     forces = {unit(name)[1] for name in TOTALS}
     return frozenset(one for one in found if one == AREA or one.times(AREA) in forces), frozenset(found & forces)
@@ -97,5 +97,5 @@ def _times(value: float | None, factor: float) -> float | None:
 
 
 def stress_name(name: str, area: float | None) -> str:
-    """Name of a quantity, with "stress" replaced by "force" if it is displayed as a total of the area (m²)."""
+    """Name of a quantity; "stress" is replaced by "force" if it is displayed as a total of the area (m²)."""
     return name if display_area("Pa", area) is None else name.replace("stress", "force")

@@ -18,9 +18,9 @@ Array = np.ndarray
 
 
 def distinct(values: Array) -> tuple[Array, Array]:
-    """Distinct values (n,) in rising order, and the index of the first of each.
+    """Distinct values (n,) in rising order, and the index of the first occurrence of each.
 
-    As `np.unique` gives with ``return_index``, without its import of masked arrays.
+    The result is that of `np.unique` with ``return_index``, which would also import masked arrays.
     """
     order = np.argsort(values, kind="stable")
     rising = values[order]

@@ -23,7 +23,7 @@ class Check(Displayed):
     how : str
         Description of the second computation.
     error : float
-        Relative difference of the two; inf if the second gave no result.
+        Relative difference of the two computations; inf if the second gave no result.
     allowed : float
         Largest relative error with which the number is reported.
     passed : bool

@@ -81,9 +81,9 @@ _ONE = re.compile(r"1\s*(?=/|$)")
 _SUPERSCRIPT = re.compile("[⁻⁺]?[⁰¹²³⁴-⁹]+")
 _PLAIN = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
 MOST_TEXT = 200
-"""Longest text of a quantity, in characters; longer ones are refused without parsing. Chosen by trial."""
+"""Largest number of characters in the text of a quantity; longer texts are refused without parsing. By trial."""
 MOST_POWER = 9
-"""Largest power of a word in a unit; keeps the SI factor of one word inside floating point (1e12 to the 9th)."""
+"""Largest power of a word in a unit, such as 2 in m^2; prefixes of up to 1e12 then stay inside floating point."""
 
 
 @lru_cache(maxsize=256)
@@ -179,7 +179,8 @@ def _from_pint(word: str) -> tuple[float, Dimension]:
         one, two = (float(base.magnitude) for base in bases)
     except Exception as error:  # pint raises exceptions of many types for words that are not units
         raise fault from error
-    if not (math.isfinite(one) and one > 0 and math.isclose(two, 2 * one)):  # no plain factor: decibels, Celsius
+    # units that are not a factor times the SI unit: decibels, Celsius
+    if not (math.isfinite(one) and one > 0 and math.isclose(two, 2 * one)):
         raise fault
     known = {"[mass]": "mass", "[length]": "length", "[time]": "time"}
     if not set(exponents) <= set(known):

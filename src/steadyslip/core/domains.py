@@ -15,8 +15,8 @@ from steadyslip.core.errors import Problem
 class Domain:
     """Interval of allowed values, open or closed at each end; `text` describes it in messages.
 
-    With `whole`, only integers are allowed. `apart` is one more allowed value of a record, outside the interval, which
-    varying the parameter does not reach.
+    With `whole`, only integers are allowed. `apart` is one more allowed value, outside the interval, that a record may
+    have; a varied parameter cannot take it.
     """
 
     low: float

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-MOST_SHOWN = 120  # characters of a value's repr in a message; chosen by trial
+MOST_SHOWN = 120  # largest number of characters of a value's repr that a message contains; chosen by trial
 
 
 def one(name: str) -> str:
@@ -69,7 +69,7 @@ class Problem:
 
 SHOWN = 30
 """Number of problems listed in a message (chosen by trial); `ParameterError.problems` has all of them."""
-ADVICE = 40  # clauses of at least this many characters are advice, printed once; shorter ones stay in every line
+ADVICE = 40  # clauses of at least this many characters count as advice and are printed once; shorter ones in every line
 
 
 class ParameterError(SteadyslipError, ValueError):

@@ -48,7 +48,7 @@ class asinh_exp(sp.Function):  # type: ignore[misc]  # noqa: N801  # named like 
 
 
 LONG_POWER = 4
-"""Formulas show powers of ten with an exponent of at least this size, of either sign, as such: 10⁻²⁴."""
+"""Least absolute value of the exponent from which formulas show a power of ten as such, for example 10⁻²⁴."""
 
 
 def power_of_ten(number: sp.Rational) -> int:
@@ -111,7 +111,7 @@ _WORLD = {
 }
 
 FEW = 8
-"""Number of rows up to which evaluation row by row with floats is faster than with arrays; chosen by trial."""
+"""Largest number of rows for which evaluation row by row, with floats, is faster than with arrays; chosen by trial."""
 
 
 def _of_numbers(function: Callable[..., Any]) -> Callable[..., float]:
@@ -379,7 +379,10 @@ def _replaced(e: Any, seen: dict[sp.Basic, sp.Basic]) -> Any:
 
 @lru_cache(maxsize=2**12)
 def symbols_of(e: sp.Expr) -> frozenset[sp.Symbol]:
-    """Symbols of an expression (cached; `free_symbols` visits all its parts each time)."""
+    """Symbols in an expression.
+
+    The result is cached, as `free_symbols` visits all parts of the expression each time.
+    """
     return frozenset(sp.sympify(e).free_symbols)
 
 

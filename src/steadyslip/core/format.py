@@ -71,7 +71,7 @@ def units_for(si_unit: str, names: frozenset[str]) -> tuple[str, ...]:
 
 
 def _is_own(name: str) -> bool:
-    """True if a unit differs from the default one by more than a leading prefix."""
+    """True if a unit differs from the default unit by more than a leading prefix."""
     return any(
         word not in PREFIXABLE or (word not in PLAIN_WORDS and (power < 0 or power > 1))
         for word, power in factors(name)
@@ -113,9 +113,9 @@ def _best(value: float, names: tuple[str, ...]) -> str | None:
 
 _SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # takes a prefix; not m^2 (it would scale m), nor s/m (ms/m misleads)
 _SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
-HIDDEN = 1e-3  # a value below this share of its error is printed as 0: none of its digits is known
-MOST_DIGITS = 12  # of the ends of a narrow range; further digits are rounding errors
-SAME_LOAD = 1e-9  # relative difference of loads that are equal apart from rounding of their units
+HIDDEN = 1e-3  # a value smaller than this share of its error is printed as 0, as none of its digits is known
+MOST_DIGITS = 12  # largest number of digits with which the ends of a narrow range are printed; more are rounding errors
+SAME_LOAD = 1e-9  # relative difference up to which two loads are equal, apart from rounding in the conversion of units
 _SHORTEST, _LONGEST = 1e-3, 1e5  # numbers in this range need no exponent; others are in the SI unit without prefix
 _LONG = 1e4  # from this number on, a suitable prefix is chosen in place of the prefix in the file
 

@@ -19,7 +19,7 @@ from steadyslip.core.quantities import example, in_si
 from steadyslip.core.roles import Role, fault
 from steadyslip.core.written import in_written_units
 
-LARGEST = 1.7e308  # largest accepted number, just below the largest float; Python integers may be larger
+LARGEST = 1.7e308  # largest accepted number, just below the largest float; larger Python integers are refused
 MOST = 1e150  # largest accepted size of array items, whose squares must be finite
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -331,7 +331,7 @@ def stand_in(law: type[R]) -> R | None:
 
 
 def field_layout(record: FrozenRecord) -> tuple[tuple[str, str, Declared], ...]:
-    """Attribute name, own dotted name and role of every field of a record."""
+    """Attribute name, dotted name within the record, and role of every field of a record."""
     kind: Any = type(record)
     return _layout_of(kind)
 
@@ -356,7 +356,7 @@ def checked(item: Field[Any], value: Any) -> Any:
 
 
 def below(role: Part, value: Any, name: str, prefix: str) -> Iterator[tuple[str, FrozenRecord]]:
-    """Yield the records that a field holds, each after the prefix of its parameters' dotted names."""
+    """Yield the records that a field holds, each with the prefix that its parameters' dotted names have."""
     if role.many:
         yield from ((f"{name}.{index}.", member) for index, member in enumerate(value, start=1))
     elif role.keyed:

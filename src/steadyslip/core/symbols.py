@@ -15,7 +15,7 @@ import sympy as sp
 from steadyslip.core.errors import InternalError
 
 _PLACE = 1
-"""`dummy_index` of all symbols; SymPy's automatic indices are above a million and differ between processes."""
+"""`dummy_index` of all symbols. Indices that SymPy chooses are above a million and differ between processes."""
 
 
 @cache
@@ -33,7 +33,7 @@ def inner_symbols(names: str, **assumptions: bool | None) -> tuple[sp.Dummy, ...
 
 
 class Letters:
-    """Unique display letters of symbols; letters in `taken` are not used.
+    """Unique display letters of symbols; letters in `taken` are never used.
 
     Attributes
     ----------

@@ -106,7 +106,10 @@ def read_tolerance(text: str) -> Tolerance:
 
 
 def _width(number: str, share: str | None, found: re.Match[str]) -> tuple[str, str]:
-    """Half-width with its unit or %, and the unit of the value; a unit that is left out is taken from the other."""
+    """Half-width with its unit or %, and the unit of the value.
+
+    If only one of the two has a unit, it is the unit of both.
+    """
     first, last = (found["first"] or "").strip(), found["last"].strip()
     return f"{number} {'%' if share else last or first}".strip(), first or last
 

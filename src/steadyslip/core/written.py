@@ -80,7 +80,7 @@ _written_as: ContextVar[WrittenAs] = ContextVar("how a parameter is written", de
 
 
 def display_as() -> WrittenAs:
-    """Unit and load that `displayed_as` has set for the current context; empty ones outside it."""
+    """Unit and load that `displayed_as` has set for the current context; without it, no unit and no load."""
     return _written_as.get()
 
 

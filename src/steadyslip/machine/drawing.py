@@ -23,8 +23,8 @@ INK, PALE, DRIVEN, FORCED = "ink", "pale", "driven", "forced"
 """Colours of bodies and links, of the ground, of the drive, and of constant forces."""
 # sizes chosen by trial, so that labels and links do not overlap
 _WIDE, _HIGH = 1.7, 1.15  # width and height of a body
-LONG = 9  # letters; longer names are written in small type
-_ACROSS, _UP = 3.7, 1.85  # distance of columns, and of rows of bodies that slide on each other
+LONG = 9  # largest number of letters of a name in normal type; longer names are written in small type
+_ACROSS, _UP = 3.7, 1.85  # distance between columns, and between rows of bodies that slide on each other
 _HOLD = 1.5  # length of links to a wall
 
 
@@ -265,7 +265,7 @@ class Drawing:
             self._named(name, link, ((start[0] + end[0]) / 2, max(start[1], end[1]) + 0.32), va="bottom")
 
     def _over(self, name: str, link: Link, left: str, right: str) -> None:
-        """Draw a link above the bodies between its ends."""
+        """Draw a link above all bodies, if there is no room for it between its ends."""
         one, two = self.places[left], self.places[right]
         y = self._next_level()
         shift = 0.6 - 0.12 * self.levels

@@ -14,7 +14,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND, LOAD_POINT
 from steadyslip.machine.surfaces import Surface
 
-_RATIO_TOLERANCE = 1e-12  # largest |ratio - 1| that counts as rounding; products of a few ratios have some 1e-16
+_RATIO_TOLERANCE = 1e-12  # largest |ratio - 1| that counts as rounding error; products of a few ratios have some 1e-16
 _LINK = Tested("the name of a link; give several names as separate arguments", lambda value: isinstance(value, str))
 
 
@@ -116,7 +116,7 @@ def _is_one(ratio: float) -> bool:
 
 
 def _joint_body(body: Body, other: Body, ratio: float) -> Body:
-    """Copy of `body` with inertia and constant force of `other` added, which moves `ratio` times as fast."""
+    """Copy of `body` to which inertia and constant force of `other` are added; `other` moves `ratio` times as fast."""
     inertia = body.inertia_of() + ratio**2 * other.inertia_of()
     force = body.along() + ratio * other.along()
     if isinstance(body, RotatingBody):

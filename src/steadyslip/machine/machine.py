@@ -55,7 +55,7 @@ class Machine(Rig):
     in_forces: ClassVar[bool] = True
 
     fed: ClassVar[str | None] = None
-    """Body in `velocity_of`, whose speed the user gave; drive.velocity is printed as its speed; not compared by ==."""
+    """Body in `velocity_of`, if the user gave its speed: drive.velocity is printed as its speed; not compared by ==."""
 
     words: ClassVar[Mapping[str, str]] = {
         "rig": "machine", "block": "body", "place": "bodies.{}", "damping": "a dashpot to the ground",
@@ -307,7 +307,8 @@ class Machine(Rig):
             end: 0 for end in self.ends()
             if (at := self._structure_at(end)) is not None and not at[1].data.rigid_motions.size
         }  # fmt: skip
-        pace = 1.0 if self.holds else self.drive.velocity  # at rest only the ratios of the speeds are used
+        # if the drive holds a place, only the ratios of the speeds are used
+        pace = 1.0 if self.holds else self.drive.velocity
         speeds, closing = rigid_motion({LOAD_POINT: pace, GROUND: 0, **still}, self._ties())
         return {name: 0 if is_zero(speed) else speed for name, speed in speeds.items()}, closing
 
@@ -478,7 +479,7 @@ class Machine(Rig):
         return Element(f"links.{name}", row, row, stiffness, link.dashpot(), GROUND in link.between)
 
     def _control(self, speeds: dict[str, Any]) -> tuple[tuple[Element, ...], Integral | None]:
-        """Elements and integral action of the controller; it may sense other bodies than the driven one."""
+        """Elements and integral action of the controller, which may measure other bodies than the driven one."""
         driven = self.drive.driven()
         if driven is None:
             return (), None

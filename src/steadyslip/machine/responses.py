@@ -15,12 +15,12 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.pages import Displayed
 from steadyslip.machine.structure_data import StructureData
 
-_OF_PHASE = 0.05  # rad; phase error of careful measurements
+_OF_PHASE = 0.05  # rad; phase errors up to this size occur in careful measurements
 MOST_LINES = 2**19
-"""Most frequencies of one response; an analyser gives some thousands."""
-_EVEN = 1e-2  # share of a step by which frequencies written with some digits may be off
-_ROUND = 1e-6  # relative error of a step of frequencies written with some digits
-_FEWEST = 8  # fewest frequencies, because the lowest and the highest octave are evaluated separately
+"""Largest number of frequencies of one response; an analyser gives some thousands."""
+_EVEN = 1e-2  # largest deviation of frequencies from even spacing, over the step, that rounding in a file explains
+_ROUND = 1e-6  # largest relative error of the step of frequencies that rounding in a file explains
+_FEWEST = 8  # least number of frequencies of a response, as its lowest and highest octave are evaluated separately
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +88,10 @@ class ResponseData(Displayed):
         return dict(zip(self.names, map(float, shares), strict=True))
 
     def step_in_turns(self) -> float:
-        """Step of the frequencies (Hz) over 2π, if they stand in steps of 2π times a round number; else 0.
+        """Step of the frequencies (Hz) divided by 2π, if the steps are 2π times a round number; else 0.
 
-        Analysers step by a round number of hertz, or its reciprocal, a duration. Numbers of rad/s read as hertz do not.
+        Analysers use steps of a round number of hertz, or of one over a round duration. If the step is 2π times such a
+        number, the frequencies in the file were probably in rad/s and have been read as Hz.
         """
         if not self.source:
             return 0.0

@@ -9,7 +9,8 @@ from steadyslip.machine.structures import StructureBody
 
 
 class Tie(NamedTuple):
-    """Coupling of two ends by a link in steady sliding: the second moves `ratio` times as fast as the first."""
+    """Coupling of two ends in steady sliding, by a link or a structure: the second moves `ratio` times as fast as
+    the first."""
 
     name: str
     first: str

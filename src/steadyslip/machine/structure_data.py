@@ -17,14 +17,12 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.roles import fault
 
 MOST_FREEDOM = 3000
-"""Most degrees of freedom of one structure: its matrices take 72 MB each, its eigenvalues minutes."""
-_FREE = 1e-10  # stiffness of a mode relative to the largest that counts as none; files of 11 digits
-_GOOD_TO = 0.5  # of the frequency of the last mode of a reduction, up to which it is meant to be good: usual practice
-_LISTED = 12  # degrees of freedom that a message lists: a line or two
-_SYMMETRIC = 1e-8  # relative asymmetry of an inertia or gyroscopic matrix that is taken for rounding of a file
-_HALVES = (
-    4  # degrees of freedom from which a triangle with an entry in each row is half a matrix: smaller ones are models
-)
+"""Largest number of degrees of freedom of a structure: each matrix then takes 72 MB, eigenvalues take minutes."""
+_FREE = 1e-10  # relative stiffness of a mode up to which the mode counts as rigid; files have some 11 digits
+_GOOD_TO = 0.5  # share of the last mode's frequency up to which a reduction is usually taken as accurate
+_LISTED = 12  # largest number of degrees of freedom that a message lists, in a line or two
+_SYMMETRIC = 1e-8  # relative asymmetry of an inertia or gyroscopic matrix up to which it counts as rounding in the file
+_HALVES = 4  # least size for which a triangular matrix with an entry in each row is taken for half of a symmetric one
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,20 +121,26 @@ class StructureData(Displayed):
         return len(self.mass)
 
     def middle_of_slow(self, least: float) -> float:
-        """Angular frequency of the middle mode, rad/s, of a structure held in place; 0 where it is above `least`."""
+        """Angular frequency (rad/s) of the middle mode of a structure that is held in place.
+
+        0 if it is above `least`.
+        """
         from scipy.linalg import eigvalsh  # slow to import
 
         stiff = 0.5 * (self.stiffness + self.stiffness.T)
-        if np.median(np.diag(stiff) / np.diag(self.mass)) > least**2:  # spares eigenvalues of nearly all
+        # avoids the computation of eigenvalues for nearly all structures
+        if np.median(np.diag(stiff) / np.diag(self.mass)) > least**2:
             return 0.0
         squares = eigvalsh(stiff, self.mass)
         middle = squares[len(squares) // 2]
         return float(np.sqrt(middle)) if squares[0] > 0 and middle < least**2 else 0.0
 
     def bent(self, row: Array, force: float) -> tuple[float, float]:
-        """Static displacement, m, in a direction `row` (n,) under a force there, N, and angular frequency of its shape.
+        """Static displacement (m) in a direction `row` (n,) under a force (N) in this direction, and a frequency
+        (rad/s).
 
-        The frequency, rad/s, is Rayleigh's quotient of the bent shape; both are 0 where nothing holds the structure.
+        The angular frequency is Rayleigh's quotient of the bent shape. Both results are 0 if nothing holds the
+        structure.
         """
         stiff = 0.5 * (self.stiffness + self.stiffness.T)
         try:
@@ -151,7 +155,7 @@ class StructureData(Displayed):
 
     @cached_property
     def digest(self) -> str:
-        """Hash of the content."""
+        """Hash of the matrices, names and points."""
         found = hashlib.sha256()
         for one in (self.mass, self.damping, self.stiffness, self.gyroscopic):
             found.update(one.tobytes())
@@ -169,12 +173,12 @@ class StructureData(Displayed):
         return hash(self.digest)
 
     def row(self, place: int | str) -> int:
-        """Row of a degree of freedom, from 0.
+        """Index, from 0, of a degree of freedom.
 
         Raises
         ------
         ParameterError
-            If there is none of this number, counted from 1, or name.
+            If no degree of freedom has this number, counted from 1, or this name.
         """
         if isinstance(place, str):
             if place in self.freedoms:
@@ -216,7 +220,7 @@ class StructureData(Displayed):
 
     @cached_property
     def rigid_motions(self) -> Array:
-        """Motions (n, k) that stretch nothing, k = 0 for a structure that its own stiffness holds."""
+        """Motions (n, k) that deform nothing; k = 0 for a structure that its stiffness holds in place."""
         squares, shapes = self._own_modes
         found: Array = shapes[:, np.abs(squares) <= _FREE * np.max(np.abs(squares), initial=0.0)]
         return found
@@ -238,19 +242,19 @@ def reduced(structure: StructureData, kept: Sequence[int | str], modes: int) -> 
     Parameters
     ----------
     structure : StructureData
-        Its points that a file of modes names are kept.
+        Structure to be reduced; points that it has from a file of modes are kept.
     kept : sequence of int or str
-        Degrees of freedom, counted from 1 or by name, that stay as they are: those of links, contacts and forces.
+        Degrees of freedom, by number from 1 or by name, that are not changed: those of links, contacts and forces.
     modes : int
-        Modes of the rest, with the degrees of freedom `kept` held, that are added; the lowest.
+        Number of modes that are added: the lowest modes of the structure with the degrees of freedom `kept` held.
 
     Returns
     -------
     reduced : StructureData
         Its first degrees of freedom are those `kept`, in their order.
     error : float
-        Largest relative error of the structure's own frequencies, up to half that of the last mode added (of the
-        lowest without modes).
+        Largest relative error of the structure's natural frequencies up to half that of the last mode added; without
+        added modes, of the lowest frequency.
 
     Raises
     ------
@@ -303,9 +307,9 @@ def reduced(structure: StructureData, kept: Sequence[int | str], modes: int) -> 
     return small, _frequency_error(structure, small, _GOOD_TO**2 * float(squares[-1]) if modes else 0.0)
 
 
-@lru_cache(maxsize=8)  # of a file; other values of a machine's parameters ask for the same again
+@lru_cache(maxsize=8)  # machines with other parameter values need the same reduction again
 def reduced_once(structure: StructureData, rows: tuple[int, ...], modes: int) -> tuple[StructureData, float]:
-    """Do the same as `reduced`, with `rows` counted from 0; kept for the next call."""
+    """Result of `reduced` for `rows` counted from 0; the result is cached."""
     return reduced(structure, tuple(row + 1 for row in rows), modes)
 
 
@@ -314,7 +318,8 @@ def _along(row: Array | None, basis: Array) -> Array | None:
 
 
 def _frequency_error(structure: StructureData, small: StructureData, most: float) -> float:
-    """Largest relative error of natural frequencies whose squares are up to `most` (rad²/s²), one at least."""
+    """Largest relative error of the natural frequencies whose squares are up to `most` (rad²/s²), at least of the
+    lowest."""
     from scipy.linalg import eigvalsh  # slow to import
 
     whole, own = (eigvalsh(0.5 * (one.stiffness + one.stiffness.T), one.mass) for one in (structure, small))

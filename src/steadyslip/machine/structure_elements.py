@@ -17,8 +17,8 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.machine.mechanism import DegreeOfFreedom, Element, Mechanism, Shares, StructurePart
 
-_DEPENDENT = 1e-10  # a direction is dependent if less than this share of its length is orthogonal to earlier ones
-_ROUNDING = 8 * np.finfo(float).eps  # times norm and size of a matrix: bound of rounding errors in matrix products
+_DEPENDENT = 1e-10  # a direction depends on earlier directions if less than this share of it is orthogonal to them
+_ROUNDING = 8 * np.finfo(float).eps  # rounding error in matrix products over norm times size of the matrix (a bound)
 MOST_COORDINATES, MOST_TERMS = 100, 1500
 """Largest number of degrees of freedom of a structure, and of entries of its damping and stiffness, for which code is
 compiled; both take some half a minute to compile."""
@@ -159,7 +159,8 @@ def _clean(matrix: Array) -> Array:
 
 
 def _chain(even: Array, first: list[Array]) -> Array:
-    """Orthonormal axes as columns (n, n), by Lanczos: from directions `first`, then from `even` times earlier axes."""
+    """Orthonormal axes as columns (n, n), by Lanczos' method, first from the directions `first`, then from `even`
+    times axes."""
     axes = np.zeros((0, len(even)))
     waiting = [*first]
     for place in range(len(even)):
@@ -172,7 +173,8 @@ def _chain(even: Array, first: list[Array]) -> Array:
 
 
 def _with_axis(axes: Array, waiting: list[Array], even: Array) -> Array:
-    """Axes (k, n) and one more, from the first independent direction in `waiting`; `even` times it joins `waiting`."""
+    """Axes (k, n) and one axis more, from the first independent direction in `waiting`, to which `even` times it is
+    added."""
     while waiting:
         one = waiting.pop(0)
         length, left = np.linalg.norm(one), one

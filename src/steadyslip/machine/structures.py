@@ -27,18 +27,19 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.machine.structure_data import StructureData, reduced_once
 
 _ONE = "give exactly one of matrices, modes and response"
-_DAMPED = 0.1  # damping ratios from here on are reported as doubtful: they were probably given in percent
-_FEEDING = 0.2  # share of frequencies at which a passive structure may seem to feed energy, by measurement errors
+_DAMPED = 0.1  # damping ratios of at least this size are reported as doubtful: they were probably given in percent
+_FEEDING = 0.2  # share of frequencies at which, by measurement errors, a passive structure may seem to supply energy
 _SLOW = 0.2  # rad/s; doubtful if half of the modes are slower: the slowest modes of towers and ships have .1 to 1
-_HELD = 2 * np.pi * 10  # rad/s; slower motions under a force may be those of a body on soft mounts
+_HELD = 2 * np.pi * 10  # rad/s; slower motions under a force are not reported: they may be of a body on soft mounts
 _STRONGEST = 200.0  # m/s; strain is velocity over that of sound: steel yields below 25 m/s, rubber breaks below 100
-_SMALL = 1e-8  # negative eigenvalues of a damping matrix below this share of the largest are rounding of the file
+# a negative eigenvalue of a damping matrix up to this share of the largest counts as rounding in the file
+_SMALL = 1e-8
 _UNITS = 'units of length, of mass or force, and of time, as in "mm t s" or "mm N s"'
 
 
 @dataclass(frozen=True)
 class Unread:
-    """Placeholder in a table for data of a file that cannot be read, with the reason."""
+    """Placeholder for data of a file that cannot be read, with the reason."""
 
     reason: str
 
@@ -277,10 +278,10 @@ class StructureBody(Body, name="structure"):
                 yield f"response: {what}: {why}"
 
     def overloaded(self, name: str, force: float) -> str:
-        """Question on a normal force (N) at a point that would break any structure; empty if it would not.
+        """Question to the user if a normal force (N) at a point would break any structure; empty if it would not.
 
         A structure of frequency ω that a force bends by d is strained as by a vibration of velocity ω d, whatever its
-        size. Units of mm and t read as m and kg leave ω as it is and make d a thousand times too large.
+        size. If a file in mm and t is read as m and kg, ω stays the same, and d is a thousand times too large.
         """
         if self.response is not None:
             return ""
@@ -297,7 +298,10 @@ class StructureBody(Body, name="structure"):
 
     @property
     def data(self) -> StructureData:
-        """Matrices of the structure, reduced if `kept_modes` is given; dummies with its points for a response."""
+        """Matrices of the structure, reduced if `kept_modes` is given.
+
+        For a measured response, unit matrices with its points.
+        """
         return self._read if self.kept_modes is None else self._reduced[0]
 
     @property
@@ -317,7 +321,7 @@ class StructureBody(Body, name="structure"):
 
     @property
     def _read(self) -> StructureData:
-        """Data of the file, not reduced; for a response dummy matrices with its points."""
+        """Data of the file, not reduced. For a measured response, unit matrices with its points."""
         if self.response is not None:
             return self.response.placed
         found = self.matrices if self.modes is None else self.modes
@@ -330,7 +334,7 @@ class StructureBody(Body, name="structure"):
         return tuple(dict.fromkeys((*self.data.points, *self.points)))
 
     def axes(self, name: str) -> tuple[Array | None, Array | None]:
-        """Rows (n,) that give the displacements of a point along the structure's own x and y; None where fixed."""
+        """Rows (n,) that give the displacements of a point along x and y of the structure; None where it is fixed."""
         if name in self.data.points:
             return self.data.points[name]
         point = self.points[name]

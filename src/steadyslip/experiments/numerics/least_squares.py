@@ -1,7 +1,7 @@
 """Nonlinear least squares for many problems at once: Levenberg–Marquardt within bounds.
 
 Problems differ in their starting points, data (bootstrap) or fixed values (profiles). Constants without a stated reason
-were chosen by trial; they trade iterations against the risk of ending too early.
+were chosen by trial: they balance the number of iterations against the risk of an early end.
 """
 
 from __future__ import annotations
@@ -18,21 +18,22 @@ Residuals = Callable[[Array, Array], tuple[Array, Array]]
 derivatives (m, p, n) of the model."""
 
 CONVERGED = 1e-10  # predicted relative decrease of the sum of squares at which a problem has converged
-STALLED = 1e-7  # the same limit once no step succeeds any more: smaller decreases are lost in the model's rounding
-KINK = 1e-9  # a failed step with a smaller predicted relative decrease ends the problem: it is at a kink
+STALLED = 1e-7  # limit in place of `CONVERGED` once all steps fail: rounding in the model hides smaller decreases
+KINK = 1e-9  # a failed step with a smaller predicted relative decrease ends a problem: the sum of squares has a kink
 MAX_DAMPING_FACTOR = 64.0  # largest factor by which the damping grows after a failed step; it doubles with each failure
 PARALLEL = 0.95  # cosine of the angle between successive steps above which they count as parallel
 MAX_STEP_RATIO = 0.95  # largest ratio of successive steps in the geometric series: stretches a step at most 20 times
-HOPE = 2.0  # ends of a rough search above this multiple of the best sum of squares are dropped
-MERGE_DISTANCE = 0.02  # largest difference in any coordinate (2 % of a logarithmic parameter) of equal minima
-SAME_SSQ = 1e-2  # relative difference of sums of squares between ends at one minimum of a rough search
+HOPE = 2.0  # final points of a rough search with more than this multiple of the best sum of squares are dropped
+MERGE_DISTANCE = 0.02  # two minima are the same up to this difference in every coordinate (2 % of a positive parameter)
+SAME_SSQ = 1e-2  # up to this relative difference of sums of squares, final points may be at the same minimum
 PROGRESS_ITERATIONS = 10  # iterations over which the progress of a problem is averaged
 LEAST_PROGRESS = 3e-7
-"""A problem in a flat valley ends below this relative decrease in `PROGRESS_ITERATIONS` iterations."""
+"""A problem in a flat valley ends if its sum of squares has a smaller relative decrease in `PROGRESS_ITERATIONS`."""
 LEAST_PROMISE = 0.1
-"""Least predicted decrease as a share of the distance to a known sum of squares; successful searches had .4 or more."""
-LOST = 4.0  # a search above this multiple of a known sum of squares after `PROGRESS_ITERATIONS` never gets there
-MAX_SSQ = 1e100  # sums of squares above count as infinite; their products would overflow
+"""A start stops if its predicted decrease is a smaller share of its excess over a known sum of squares; in successful
+starts the share was 0.4 or more."""
+LOST = 4.0  # a start stops if it exceeds this multiple of a known sum of squares after `PROGRESS_ITERATIONS`
+MAX_SSQ = 1e100  # larger sums of squares count as infinite, as their products would overflow
 DAMPING_FAR, DAMPING_NEAR = 1e-2, 1e-6  # initial damping, relative to the curvature: far from a minimum, and near one
 MAX_STEP = 2.0  # largest step in any coordinate: a factor exp(2) of a logarithmic parameter
 
@@ -76,12 +77,12 @@ class Minima:
 
     @classmethod
     def at(cls, coordinates: Array) -> Minima:
-        """Starting points (m, p) as minima with infinite sums of squares."""
+        """Minima with infinite sums of squares at the starting points `coordinates` (m, p)."""
         count = len(coordinates)
         return cls(coordinates, np.full(count, np.inf), np.zeros(count, dtype=bool), np.zeros(count, dtype=int))
 
     def distinct(self, most: int, hope: float = HOPE) -> tuple[Array, Array]:
-        """Coordinates of up to `most` different minima, the best first, and the number of problems that ended at each.
+        """Coordinates of up to `most` different minima, the best first, and number of problems that ended at each.
 
         Minima whose sum of squares is more than `hope` times the least are left out.
         """
@@ -123,12 +124,12 @@ def minimise(
     tolerance : float
         Predicted relative decrease of the sum of squares at which a problem has converged.
     race : int
-        If positive, all problems are starts of the same problem. Once a start has converged, starts that are too slow
-        to reach its sum of squares stop. Once `race` starts have converged to the best minimum, or are one step away
-        from it, starts that predict no better minimum stop.
+        If positive, the problems are the same and differ only in their starts. Once a start has converged, starts that
+        are too slow to reach its sum of squares stop. Once `race` starts have converged to the best minimum, or are
+        one step away from it, starts that predict no better minimum stop.
     known : float
-        Sum of squares that the problem is known to reach from another start: starts that are too slow to reach it stop;
-        so do, without a race, starts whose predicted decrease is small compared with the distance to it.
+        Sum of squares that the problem is known to reach from another start. Starts that are too slow to reach this sum
+        stop; without a race, starts whose predicted decrease is small compared with their excess over it stop as well.
     callback : callable, optional
         Called after every iteration with the `Minima` so far.
     stop : callable, optional
@@ -204,7 +205,7 @@ def minimise(
         good = after < before
         with np.errstate(all="ignore"):
             ratio = np.where(expected > 0, (before - after) / expected, 0.0)
-        tried = ~good & (stretch > 1)  # a stretched step failed: the unstretched one may succeed, keep the damping
+        tried = ~good & (stretch > 1)  # a stretched step failed: the step itself may succeed, so keep the damping
         stuck[active] = ~good & ~tried & (hoped <= KINK * before)
         factor = np.where(good, np.where(ratio > 0.25, 0.2, 1.0), np.where(tried, 1.0, raised[active]))
         damped[active] = np.clip(damped[active] * factor, 1e-12, None)
@@ -220,7 +221,7 @@ def minimise(
 
 
 def _near(coordinates: Array, places: Array) -> Array:
-    """True for each of the points (m, p) within `MERGE_DISTANCE` of one of the points `places` (k, p)."""
+    """Mask (m,) of the points `coordinates` (m, p) within `MERGE_DISTANCE` of any of the points `places` (k, p)."""
     apart = np.max(np.abs(coordinates[:, None] - places), axis=2, initial=0.0)
     return np.asarray(np.any(apart < MERGE_DISTANCE, axis=1))
 
@@ -248,13 +249,13 @@ def _normal(r: Array, jacobian: Array) -> tuple[Array, Array, Array]:
 
 
 def _steps(normal: Array, gradient: Array, free: Array, damping: Array, scale: Array) -> tuple[Array, Array]:
-    """Decrease (m,) of the sum of squares that the linearised problem predicts undamped, and damped steps (m, p)."""
+    """Decrease (m,) of the sum of squares that the linearised problem predicts undamped; damped steps (m, p)."""
     diagonal = np.einsum("mii->mi", normal)
     extra = np.stack([
         np.broadcast_to(1e-12 * np.max(diagonal, axis=1, keepdims=True), diagonal.shape),
         damping[:, None] * np.maximum(scale, 1e-12 * np.max(scale, axis=1, keepdims=True)),
     ])  # fmt: skip
-    # solved in the free coordinates, scaled to a unit diagonal
+    # the equations are solved in the free coordinates, scaled so that the matrix has a unit diagonal
     total = diagonal + extra
     size_of = np.sqrt(np.maximum(total, 1e-300))
     matrix = normal / (size_of[..., :, None] * size_of[..., None, :])

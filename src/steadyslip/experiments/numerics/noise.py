@@ -19,32 +19,32 @@ from scipy.linalg import matmul_toeplitz, solve_toeplitz
 from steadyslip.core.arrays import Array
 from steadyslip.core.results import ReadOnly
 
-SIGNIFICANT = 4.0  # lag-1 autocorrelation that is not by chance, in standard errors for white noise
+SIGNIFICANT = 4.0  # a larger lag-1 autocorrelation, in standard errors for white noise, is not due to chance
 NOTICED, NOTICED_CHANCE = 1.0, 0.05
-"""Noise is described as correlated from this positive lag-1 autocorrelation (in standard errors for white noise), or
-below this probability of the correlation over all lags for white noise. With these limits, the rms of deviation over
-error in 150 linear fits of 600 samples was .98 to 1.05 for white noise and 1.12 with slow noise of a quarter of its
-size; with 2 and .01, 1.28."""
+"""Noise counts as correlated if its lag-1 autocorrelation exceeds the first number (standard errors of white noise), or
+if white noise would have its correlation over all lags with a smaller probability than the second number. With these
+limits, the root mean square of deviation over error in 150 linear fits of 600 samples was 0.98 to 1.05 for white noise,
+and 1.12 if slow noise of a quarter of its size was added; with limits of 2 and 0.01 it was 1.28."""
 MAX_ORDER = 40  # largest order of the autoregression; above about a tenth of the samples it is not determined
-LAGS = 20  # most lags in tests for correlation, in samples; at most a tenth of the samples
-MIN_CHANCE = 1e-3  # innovations of the simple noise model are not white below this probability in such a test
-STRUCTURE = 1e-3  # probability of the whiteness test below which residuals have structure
+LAGS = 20  # largest number of lags in tests for correlation; in short records, a tenth of the number of samples
+MIN_CHANCE = 1e-3  # if a test for correlation gives a smaller probability, the simple noise model is not sufficient
+STRUCTURE = 1e-3  # residuals have structure if the whiteness test gives a smaller probability
 JUMP = 10.0
-"""Innovation, in standard deviations of most of them, that is no noise: of 30 fits to records with noise none was
-beyond 4.6, of one that did not follow a slip event the largest was 657."""
-JUMPED = 5  # residuals as large as such an innovation that follow a jump, at least; wild samples are single
-JUMP_SHARE = 0.02  # range of the data, as a share, that such residuals exceed; residuals of exact data are rounding
+"""A larger innovation, in robust standard deviations of the innovations, is no noise. In 30 fits to noisy records no
+innovation was beyond 4.6; in a fit whose model missed a slip event the largest was 657."""
+JUMPED = 5  # a jump has at least this many residuals above the limit: a single one is a faulty sample
+JUMP_SHARE = 0.02  # smallest such limit, as a share of the range of the data: residuals of exact data are rounding
 FIRST_GUESSES = ((0.5, 0.0), (0.9, 0.7), (0.98, 0.7), (0.0, 0.3))  # candidates for the starting decay and average
-LONGEST = 0.05  # largest correlation between the ends of a record: slower noise looks like a constant
+LONGEST = 0.05  # largest correlation of noise between the ends of a record: slower noise looks like a constant
 CURVATURE_STEP = 0.05  # step of finite differences of the likelihood, in artanh of decay and average
-LEAST_CURVATURE = 0.25  # least curvature of the likelihood, for a deviation of 2 at most: beyond, tanh is flat
+LEAST_CURVATURE = 0.25  # least curvature of the likelihood: limits standard deviations to 2, beyond which tanh is flat
 MEDIAN_DEVIATION = 0.6745  # median of absolute deviations of Gaussian noise, in standard deviations
-FITTED_RANK = 1e-6  # derivatives are linearly dependent below this ratio of singular values
+FITTED_RANK = 1e-6  # derivatives count as linearly dependent below this ratio of singular values to the largest
 VANISHED = 1e-30  # smaller powers are set to 0: they have no effect, and denormal numbers are a hundred times slower
 TAIL = 1e-4  # the autocovariance is continued until it is below this share of the variance
 
 _RECENT: deque[tuple[bytes, Array]] = deque(maxlen=8)
-"""Recent calls of `first_order` (digest of the arguments) and their optima: a fit describes most residuals twice."""
+"""Digests of the arguments of recent calls of `first_order`, and their optima: a fit describes most residuals twice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Noise(ReadOnly):
     innovation : float
         Variance of the white noise that drives the autoregression.
     covariance : ndarray
-        Autocovariance at lags 0, 1, ... samples, as mean over all likely parameters of the noise.
+        Autocovariance at lags 0, 1, ... samples, averaged over all likely parameters of the noise.
     """
 
     lag1: float
@@ -104,7 +104,7 @@ class Noise(ReadOnly):
         return np.asarray(-0.5 * (after**2 / variance + np.log(2 * np.pi * variance)))
 
     def drawn(self, many: int, count: int, generator: np.random.Generator) -> Array:
-        """Simulated noise (many, count)."""
+        """Simulated noise (many, count): `many` independent series of `count` samples."""
         from scipy.signal import lfilter
 
         first = len(self.covariance) if len(self.coefficients) else 0  # discarded: the filter starts from zero
@@ -121,8 +121,8 @@ def white(residuals: Array, free: int = 0) -> Noise:
 def lasting(values: Array) -> float:
     """Lag-1 autocorrelation (0 to 0.99) of the noise in values (n,) that also vary slowly.
 
-    It follows from differences over one and over two samples: noise with correlation ρ**lag has differences of variance
-    2σ²(1 - ρ) and 2σ²(1 - ρ²).
+    It is computed from differences over one and over two samples, which have the variances 2σ²(1 - ρ) and 2σ²(1 - ρ²)
+    for noise with correlation ρ**lag.
     """
     one, two = (float(np.median(np.abs(values[k:] - values[:-k]))) for k in (1, 2))
     return float(np.clip((two / one) ** 2 - 1.0, 0.0, 0.99)) if one > 0 else 0.0
@@ -146,7 +146,7 @@ def _products(residuals: Array, most: int) -> Array:
 
 
 def portmanteau(values: Array, lags: int) -> float:
-    """Ljung and Box's statistic of values (n,): n (n + 2) Σ r²/(n - lag), with the autocorrelation r."""
+    """Ljung and Box's statistic of values (n,): n (n + 2) Σ r²/(n - lag), with the autocorrelation r at each lag."""
     n, lag = len(values), np.arange(1, lags + 1)
     return float(n * (n + 2) * np.sum(autocorrelation(values, lags)[1:] ** 2 / (n - lag)))
 
@@ -162,7 +162,7 @@ class FirstOrder:
         Variance of the innovations e.
     innovations : ndarray (n,)
     alternatives : tuple of (decay, average, variance)
-        Other likely parameters; the mean over them approximates the mean over the likelihood.
+        Other likely parameters; averages over them approximate averages over the likelihood.
     """
 
     decay: float
@@ -173,16 +173,16 @@ class FirstOrder:
 
     @property
     def coefficients(self) -> Array:
-        """Coefficients of the equivalent autoregression, until they are below `TAIL`."""
+        """Coefficients of the equivalent autoregression, of lag 1, 2, ... until they are below `TAIL`."""
         first, theta = self.decay - self.average, self.average
         count = np.log(TAIL / abs(first)) / np.log(abs(theta)) if abs(first) > TAIL and theta else 0.0
         return np.asarray(first * theta ** np.arange(min(int(count) + 1, len(self.innovations) - 1)))
 
     def mean_covariance(self, n: int) -> Array:
-        """Mean autocovariance of the alternatives, at lags 0, 1, ...; errors from the best parameters are too small.
+        """Autocovariance at lags 0, 1, ..., averaged over `alternatives`; up to `n` lags.
 
-        A record of few correlation times determines the variance of the noise poorly, and an uncertain variance widens
-        the distribution of deviations over standard errors.
+        If a record is only a few correlation times long, it determines the variance of the noise poorly, and errors
+        computed with the best parameters would be too small.
         """
         each = [replace(self, decay=d, average=a, variance=v).covariance(n) for d, a, v in self.alternatives]
         found = np.zeros(max(map(len, each)))
@@ -191,7 +191,7 @@ class FirstOrder:
         return found
 
     def covariance(self, n: int) -> Array:
-        """Autocovariance at lags 0, 1, ..., until it is below `TAIL`."""
+        """Autocovariance at lags 0, 1, ..., up to `n` lags or until it is below `TAIL`."""
         phi, theta = self.decay, self.average
         first = np.array([1 + theta**2 - 2 * phi * theta, (1 - phi * theta) * (phi - theta)]) / (1 - phi**2)
         size = abs(first[1] / first[0])
@@ -203,9 +203,9 @@ class FirstOrder:
 def first_order(residuals: Array, rows: Array | None = None) -> FirstOrder:
     """White noise plus a first-order autoregression, fitted to residuals (n,) by restricted maximum likelihood.
 
-    `rows` (p, n) are the derivatives by the parameters that were fitted to the record. The fit removed slow noise from
-    the residuals, which the restricted likelihood (Patterson & Thompson 1971) takes into account. The value of the
-    autoregression before the first sample is one more parameter.
+    `rows` (p, n) are the derivatives of the model by the parameters that were fitted to the record. That fit removed
+    slow noise from the residuals, which the restricted likelihood (Patterson & Thompson 1971) takes into account. The
+    value of the autoregression before the first sample is a further parameter.
     """
     from scipy.linalg.lapack import dpotrf
     from scipy.optimize import minimize
@@ -243,10 +243,10 @@ def first_order(residuals: Array, rows: Array | None = None) -> FirstOrder:
 
 
 def _likely(deviance: Callable[[Array], float], best: Array) -> list[Array]:
-    """Points of a cubature rule for a normal distribution: means over the points are means over the distribution.
+    """Points of a cubature rule for a normal distribution: averages over them are averages over the distribution.
 
     Minus twice the log-density is `deviance`, approximated by a parabola at its minimum `best`. There are two points on
-    each axis of the distribution, one on each side (rule of third degree, Stroud 1957).
+    each axis of the distribution, one on either side (rule of third degree, Stroud 1957).
     """
     count, steps, middle = len(best), CURVATURE_STEP * np.eye(len(best)), deviance(best)
 
@@ -266,7 +266,8 @@ def _likely(deviance: Callable[[Array], float], best: Array) -> list[Array]:
 def describe(residuals: Array, free: int = 0, always: bool = False, rows: Array | None = None) -> Noise:
     """Noise model of residuals: white, white plus a first-order autoregression, or an autoregression.
 
-    The autoregression, whose order minimises Akaike's criterion, is used only if the second model leaves correlation.
+    A general autoregression, whose order minimises Akaike's criterion, is used only if the second model leaves
+    correlation.
 
     Parameters
     ----------
@@ -274,7 +275,7 @@ def describe(residuals: Array, free: int = 0, always: bool = False, rows: Array 
     free : int
         Number of parameters that were fitted to the record.
     always : bool
-        True to treat the residuals as correlated even if neither lag 1 nor all lags together show it.
+        True to treat the residuals as correlated even if no test finds a correlation.
     rows : ndarray (p, n), optional
         Derivatives of the model by the fitted parameters.
     """
@@ -309,7 +310,7 @@ def describe(residuals: Array, free: int = 0, always: bool = False, rows: Array 
 
 
 def _covariance(gamma: Array, phi: Array, n: int) -> Array:
-    """Autocovariance of an autoregression: `gamma` at the first lags, continued by coefficients `phi` to `TAIL`."""
+    """Autocovariance of an autoregression: `gamma` at the first lags, then from coefficients `phi` down to `TAIL`."""
     found = list(gamma[: len(phi) + 1])
     limit = TAIL * gamma[0]
     while len(found) < n and np.max(np.abs(found[-len(phi) :])) > limit:
@@ -325,9 +326,9 @@ class Whiteness:
     ----------
     statistic : float
         Ljung and Box's (1978) Q of the innovations of white noise plus a first-order autoregression, plus McLeod and
-        Li's (1983) Q of their squares, which shows misfit that gathers at some times.
+        Li's (1983) Q of the squared innovations, which shows misfit that is concentrated at some times.
     degrees : int
-        Degrees of freedom of its chi-squared distribution, which is also its mean if there is no structure.
+        Degrees of freedom of the chi-squared distribution that the statistic has if there is no structure.
     """
 
     statistic: float
@@ -335,17 +336,17 @@ class Whiteness:
 
     @property
     def p(self) -> float:
-        """Probability that noise alone makes the statistic as large."""
+        """Probability that noise alone makes the statistic at least as large."""
         from scipy.stats import chi2
 
         return float(chi2.sf(self.statistic, self.degrees)) if self.degrees else 1.0
 
 
 def largest_jump(residuals: Array, data: Array) -> float:
-    """Largest innovation of residuals (n,) in standard deviations of most of them, if it is no noise; else 0.
+    """Largest innovation of residuals (n,) in robust standard deviations of the innovations, if it is no noise; else 0.
 
-    A sudden slip that the model does not follow makes few innovations so large that the noise with which it is compared
-    in a portmanteau test is all its own: nothing is found then.
+    A portmanteau test misses a sudden slip that the model does not follow, because the few large innovations at the
+    slip dominate the variance by which the test divides.
     """
     innovations = first_order(residuals).innovations if len(residuals) > JUMPED else np.zeros(1)
     noise = float(np.median(np.abs(innovations - np.median(innovations)))) / MEDIAN_DEVIATION

@@ -19,16 +19,16 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 
 MIN_LOG_SPREAD = -16.0  # lower bound of ln(spread / prior scale): spreads below 1e-7 of the scale count as none
-WALKERS, BURN = 40, 250  # least number of walkers, and steps discarded at the start; chosen by trial, for time
-THINNING = 20  # steps between the draws that are kept of a walker, about its autocorrelation time
-MIN_STEPS = 350  # least number of steps after the discarded ones, for a usable autocorrelation time
-FEWEST_TIMES = 20  # autocorrelation times that the steps must span, as each walker has few draws; chosen by trial
-MOST_ROUNDS = 3  # most rounds of further steps, each of which doubles their number, until they span `FEWEST_TIMES`
+WALKERS, BURN = 40, 250  # least number of walkers, and number of first steps that are discarded; chosen by trial
+THINNING = 20  # every 20th step of a walker is kept, as its autocorrelation time is about 20 steps
+MIN_STEPS = 350  # least number of steps that are not discarded, for a usable estimate of the autocorrelation time
+FEWEST_TIMES = 20  # least number of autocorrelation times in the steps of a walker; chosen by trial
+MOST_ROUNDS = 3  # the number of steps is doubled at most this often to contain `FEWEST_TIMES` autocorrelation times
 ALIKE = 3.0  # exponent η of the prior |R|^(η − 1) of correlation matrices: with η = 1, spreads were too large
 SMALL = 0.5
-"""Power of a spread in the density of its logarithm. With 1 (half-normal prior), medians of the spread of five rocks
-were 15 to 26 % too large and 95 % intervals contained the truth in .90 to .93 of 500 cases; with 0 the posterior cannot
-be normalised."""
+"""Power of a spread in the prior density of its logarithm. With a power of 1 (half-normal prior), medians of the spread
+of five rocks were 15 to 26 % too large, and 95 % intervals contained the true spread in 90 to 93 % of 500 cases; with a
+power of 0 the posterior cannot be normalised."""
 MOST_BEND = 8.0  # largest |artanh| of a partial correlation: closer to 1 than 1e-6 counts as 1
 
 
@@ -39,7 +39,7 @@ class ExperimentEstimate:
     Attributes
     ----------
     indices : ndarray of int (k,)
-        Indices of the coordinates, of p, that the experiment determines.
+        Indices of those of the p coordinates of the population that the experiment determines.
     values : ndarray (k,)
         Estimates of these coordinates.
     covariance : ndarray (k, k)
@@ -54,7 +54,7 @@ class ExperimentEstimate:
     design: Array
 
     def slopes(self, size: int) -> Array:
-        """Derivatives of the expected estimates with respect to β, (k, p q)."""
+        """Derivatives (k, p q) of the expected estimates with respect to β, in `size` = p coordinates."""
         found = np.zeros((len(self.indices), size, len(self.design)))
         found[np.arange(len(self.indices)), self.indices] = self.design
         return found.reshape(len(self.indices), -1)
@@ -62,7 +62,7 @@ class ExperimentEstimate:
 
 @dataclass(frozen=True, eq=False)
 class Pooled:
-    """Draws from the posterior of a population, m of them, in p coordinates.
+    """Draws from the posterior of a population: m draws in p coordinates.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Pooled:
     steps : int
         Number of steps of each walker.
     chains : int
-        Number of walkers; the draws of one follow those of another, equally many of each.
+        Number of walkers. Every walker has equally many draws, and all its draws follow each other.
     """
 
     mean: Array
@@ -137,7 +137,7 @@ def log_evidence(experiments: list[ExperimentEstimate], covariance: Array) -> tu
 
 
 def pooled(experiments: list[ExperimentEstimate], size: int, scale: Array, count: int, seed: int) -> Pooled:
-    """Draws of covariance, mean and experiments of a population from their posterior, by affine-invariant MCMC.
+    """Posterior draws of a population: its mean, its covariance, and its experiments, by affine-invariant MCMC.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def pooled(experiments: list[ExperimentEstimate], size: int, scale: Array, count
     scale : ndarray (p,)
         Scales of the priors of the spreads.
     count : int
-        Least number of draws; it is rounded up to equally many of every walker.
+        Least number of draws; it is rounded up so that every walker has equally many draws.
     seed : int
 
     Raises
@@ -231,7 +231,7 @@ def _initial_spreads(experiments: list[ExperimentEstimate], size: int, scale: Ar
 def _conditional_draws(
     experiments: list[ExperimentEstimate], root: Array, generator: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Draw means (m, p, q) and members (m, j, p) from their exact distributions given roots of the covariance."""
+    """Draws of means (m, p, q) and experiments (m, j, p) from their normal distributions for given `root`."""
     count, size = root.shape[:2]
     covariance = root @ root.transpose(0, 2, 1)
     _, precision, best = log_evidence(experiments, covariance)
@@ -241,7 +241,7 @@ def _conditional_draws(
     members = np.empty((count, len(experiments), size))
     for j, one in enumerate(experiments):  # draw from the prior and correct it by the misfit (Hoffman & Ribak 1991)
         members[:, j] = drawn = mean @ one.design + (root @ generator.standard_normal((count, size, 1)))[:, :, 0]
-        if not len(one.indices):  # an experiment that determines nothing adds nothing
+        if not len(one.indices):  # an experiment that determines no coordinate changes nothing
             continue
         seen = drawn[:, one.indices] + generator.multivariate_normal(
             np.zeros(len(one.indices)), one.covariance, size=count, method="eigh"
@@ -255,7 +255,7 @@ def _conditional_draws(
 def run_walkers(
     log_density: Callable[[Array], Array], begin: Array, steps: int, seed: int, what: str, differences: bool = False
 ) -> tuple[Any, float]:
-    """Run the walkers of an affine-invariant MCMC sampler.
+    """Run an affine-invariant MCMC sampler; return it and the longest autocorrelation time.
 
     Parameters
     ----------
@@ -269,8 +269,8 @@ def run_walkers(
     what : str
         Name of the task, for the error message if emcee is missing.
     differences : bool
-        True to move walkers along the difference of two others (ter Braak & Vrugt 2008) instead of by stretches; in 10
-        to 15 dimensions this needed a third of the steps.
+        True to move a walker along the difference of two other walkers (ter Braak & Vrugt 2008) instead of along the
+        line to another walker; in 10 to 15 dimensions this needed a third of the steps.
 
     Returns
     -------
@@ -294,7 +294,7 @@ def run_walkers(
 
 
 def spread_of_chains(chains: Array) -> float:
-    """Split R-hat of chains (c, n) of one quantity: 1 if all halves of chains agree, larger if they do not."""
+    """Split R-hat of chains (c, n) of one quantity: 1 if the halves of all chains agree, larger if they do not."""
     half = chains.shape[1] // 2
     if half < 2:
         return np.inf

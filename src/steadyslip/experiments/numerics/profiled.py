@@ -1,8 +1,8 @@
 """Bounded least squares for a few parameters, with confidence intervals from the profile of the sum of squares.
 
 The model of a friction curve is far from linear in some parameters, so that intervals from standard errors would be too
-short. The profile of a parameter is the least sum of squares at each of its values; a confidence interval contains the
-values at which it exceeds the minimum by no more than chance explains.
+short. The profile of a parameter is the least sum of squares at each of its values. A confidence interval contains the
+values at which the profile exceeds its minimum by no more than chance explains.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ Residuals = Callable[[Array], tuple[Array, Array]]
 """Function of the parameters (p,) that returns residuals (n,) and their Jacobian (n, p)."""
 
 TOLERANCE = 1e-10  # relative tolerance of the sum of squares and of the step, far below noise
-MOST_EVALUATIONS = 200  # most evaluations of one search; dozens suffice
+MOST_EVALUATIONS = 200  # largest number of evaluations in one search; dozens suffice
 FIRST_DAMPING, EASED, MOST_DAMPING = 1e-4, 10.0, 1e10
-"""Damping of Levenberg's method relative to the squared slopes: initial value, factor per step, largest value."""
-MOST_STEPS, FURTHER = 40, 1.5  # most steps outward to an end of an interval, and the ratio of successive steps
-CLOSE = 0.01  # relative amount by which the rise at an end may fall short after a search from all starts
+"""Damping of Levenberg's method relative to the squared slopes: initial value, factor by which it changes after each
+step, largest value."""
+MOST_STEPS, FURTHER = 40, 1.5  # most steps outwards to an end of an interval, and ratio of successive steps
+CLOSE = 0.01  # at an end, searches from all starts may find a rise that is lower by this relative amount
 PRECISION = 1e-3  # tolerance for the ends of intervals, as a share of their width: three digits are enough
-BETTER = 1e-6  # relative decrease of the sum of squares that counts as another minimum
+BETTER = 1e-6  # a point whose sum of squares is smaller by more than this relative amount is near another minimum
 EXACT = 1e-20  # a smaller mean square residual is rounding, not noise
 
 
@@ -142,7 +143,7 @@ def intervals(minimum: ProfiledMinimum, levels: tuple[float, ...]) -> tuple[Prof
     Returns
     -------
     minimum : ProfiledMinimum
-        The given minimum, or a better one that was found on the way.
+        The given minimum, or a better minimum that was found during the search.
     ends : ndarray (p, levels, 2)
         Ends of the intervals; infinite where the interval reaches a bound of the parameter.
     """
@@ -176,16 +177,16 @@ def _ends(minimum: ProfiledMinimum, i: int, limits: list[float]) -> Array:
 
 
 class _Profile:
-    """Profile of one parameter as t: the root of the rise of the least sum of squares over the variance.
+    """Profile of one parameter as t = √(rise of the least sum of squares / variance), called the rise in this class.
 
-    The search at a value starts from the nearest known values on both sides, so that one search that failed does not
-    mislead the next; `check` repeats it from all starts.
+    The search at a value of the parameter starts from the solutions at the nearest known values on both sides, so that
+    a failed search does not mislead the next search; `check` repeats the search from all starts.
     """
 
     def __init__(self, minimum: ProfiledMinimum, i: int) -> None:
         self.minimum, self.place, self.own = minimum, i, float(minimum.at[i])
         self._at = {self.own: minimum.at}
-        self.known = {self.own: 0.0}  # rise by value
+        self.known = {self.own: 0.0}  # rise at each value of the parameter at which it is known
 
     def rise(self, value: float) -> float:
         if value not in self.known:
@@ -197,7 +198,7 @@ class _Profile:
         return self.known[value]
 
     def check(self, value: float) -> float:
-        """Rise at a known value after searches from all starts; if it changes, values further out are discarded."""
+        """Rise at a known value after searches from all starts; if it falls, results further out are discarded."""
         before, at = self.known[value], self._at[value]
         self._search(value, [at, self.minimum.at, *self.minimum.starts])
         if self.known[value] < before * (1 - PRECISION):
@@ -214,7 +215,7 @@ class _Profile:
 
 
 def _end(profile: _Profile, limit: float, step: float) -> float:
-    """Farthest value at which a profile rises to a limit; infinite if it stays below the limit within the bounds.
+    """Value at which a profile finally exceeds a limit; infinite if it stays below the limit within the bounds.
 
     The first step of the search is `step` long; its sign is the side of the minimum.
     """

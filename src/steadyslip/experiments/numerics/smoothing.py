@@ -10,15 +10,15 @@ from scipy.interpolate import BSpline, make_interp_spline, make_smoothing_spline
 
 from steadyslip.core.arrays import Array
 
-MOST_KNOTS = 4000  # most knots of a smoothing spline: cross-validation then takes about a second
+MOST_KNOTS = 4000  # largest number of knots of a smoothing spline: cross-validation then takes about a second
 LOW_NOISE = 1e-3  # columns with less noise, as a share of their range, always get `MOST_KNOTS`
 
 
 def smoothing_curve(time: Array, values: Array, noise: float, knots: int = MOST_KNOTS) -> Smooth:
     """Cubic smoothing spline through samples; cross-validation sets its smoothness.
 
-    If there are more samples than `knots`, the spline is fitted to means of groups of samples: correlated noise would
-    mislead cross-validation, and group means are nearly independent. Results are cached.
+    If there are more samples than `knots`, the spline is fitted to means of groups of samples, whose noise is nearly
+    independent: correlated noise would mislead cross-validation. Results are cached.
     """
     columns = (np.asarray(column, dtype=float).tobytes() for column in (time, values))
     return _curve(*columns, noise, min(knots, MOST_KNOTS))

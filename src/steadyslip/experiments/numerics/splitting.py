@@ -6,21 +6,21 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 
-EVIDENCE = 60.0  # least decrease of the squared misfit by a split, in noise variances; by chance it is far smaller
+EVIDENCE = 60.0  # a split must reduce the squared misfit by this many noise variances; by chance it is far less
 MAD_TO_SIGMA = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 FEWEST = 4  # least number of samples in a range
 RESOLUTION = 1e-7  # least noise assumed, as a share of the range of a column
 MAX_RANGES = 500  # largest number of ranges
 MAX_SWEEPS = 4  # largest number of passes that adjust the ends of the ranges
-BRIEFLY = 33  # window, in means, for the usual motion from mean to mean; shorter motions than half of it are brief
-FAST = 10.0  # a motion is fast from this multiple of the usual motion plus this multiple of its scatter
-BESIDE = 4  # means on each side of a fast part whose samples are kept too
+BRIEFLY = 33  # number of means whose median motion is the usual one; brief motions last less than half as many means
+FAST = 10.0  # a motion is fast if it exceeds the usual motion plus its scatter, both times this factor
+BESIDE = 4  # samples are also kept in this many means on each side of a fast motion
 STAIRCASE_SHARE = 0.2
-"""A column that starts or stops changing at a larger share of its samples is a staircase due to its resolution."""
+"""A column that starts or stops changing at a smaller share of its samples is not a staircase due to its resolution."""
 
 
 def spread(values: Array) -> float:
-    """Standard deviation from the median absolute deviation, robust against outliers; 0 for no values."""
+    """Standard deviation of values, computed from their median absolute deviation; 0 if there are no values."""
     return float(MAD_TO_SIGMA * np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
 
 
@@ -56,10 +56,10 @@ def _stair_height(values: Array) -> float:
 
 
 def ranges_of_means(displacement: Array, step: int, most: int) -> tuple[Array, bool]:
-    """First samples of ranges whose means are to be segmented, and True if some ranges are single samples.
+    """Indices of the first samples of ranges that are to be averaged, and True if some ranges are single samples.
 
-    A range has `step` samples. Where the load point moves briefly and so fast that means would hide it, each sample is
-    a range, unless there would be more than `most` of them.
+    A range has `step` samples. During a motion so brief and fast that averages would hide it, every sample is a range,
+    unless more than `most` samples would be.
     """
     from scipy.ndimage import median_filter, uniform_filter1d
 
@@ -82,8 +82,8 @@ def typical(noise: Array) -> float:
 def split(time: Array, values: Array, noise: Array | float, linear: bool) -> list[tuple[int, int]]:
     """Ranges of samples (first, one past the last) in which a line, or a constant, fits to within the noise.
 
-    Ranges are split in two, where that reduces the misfit most, as long as it reduces the misfit by more than noise
-    explains. `noise` is its standard deviation, for all samples or for each (n,).
+    A range is split at the sample at which this reduces the misfit most, as long as the reduction is larger than noise
+    explains. `noise` is the standard deviation of the noise, one number or one for each sample (n,).
     """
     noise = np.broadcast_to(noise, len(time))
     waiting = [(0, len(time))]
@@ -101,7 +101,7 @@ def split(time: Array, values: Array, noise: Array | float, linear: bool) -> lis
 def _with_ends_adjusted(
     ends: list[tuple[int, int]], time: Array, values: Array, noise: Array, linear: bool
 ) -> list[tuple[int, int]]:
-    """Ranges with their common ends moved to the best place: early splits were made without knowing later ones."""
+    """Ranges with each common end moved to the best place, as ranges were split further after it was set."""
     for _ in range(MAX_SWEEPS):
         found = [ends[0]]
         for _, j in ends[1:]:
@@ -134,7 +134,7 @@ def _best_cut(time: Array, values: Array, linear: bool) -> tuple[int, float]:
 
 
 def _misfits(t: Array, y: Array, linear: bool) -> Array:
-    """Squared misfit of a line (or constant) through the first 1, 2, ... points, (n,)."""
+    """Squared misfit (n,) of a line, or of a constant, through the first k points, for k = 1 to n."""
     count = np.arange(1, len(t) + 1)
     sy, syy = np.cumsum(y), np.cumsum(y * y)
     result = syy - sy * sy / count

@@ -13,7 +13,7 @@ from steadyslip.core.errors import NotAvailable
 
 @dataclass(frozen=True)
 class SampleDraws:
-    """Measured samples of the records, with their likelihood and prediction by m draws, by name of a column.
+    """Measured samples of each record or column, with their likelihood and prediction for m draws.
 
     Attributes
     ----------
@@ -21,8 +21,8 @@ class SampleDraws:
         s.
     observed : dict of str to ndarray (n,)
     log_likelihood, predicted : dict of str to ndarray (m, n)
-        Logarithm of the probability density of each sample given those before it, and simulated samples with noise;
-        draws of one chain follow those of another.
+        Logarithm of the probability density of each sample given the samples before it, and simulated samples with
+        noise. Draws are sorted by chain.
     """
 
     times: dict[str, Array]
@@ -31,7 +31,7 @@ class SampleDraws:
     predicted: dict[str, Array]
 
 
-MEMBERS = "experiment"  # name of the dimension of quantities that each experiment has
+MEMBERS = "experiment"  # name of the dimension of quantities that have a value for every experiment
 
 
 def inference_data(
@@ -67,7 +67,7 @@ def inference_data(
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FutureWarning)  # ArviZ announces later versions of itself
+            warnings.simplefilter("ignore", FutureWarning)  # ArviZ announces its later versions
             import arviz
     except ImportError as error:
         raise NotAvailable("this needs the package arviz; install steadyslip[lab]") from error

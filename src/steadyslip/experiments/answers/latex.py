@@ -13,19 +13,19 @@ from steadyslip.experiments.fitting.estimates import Estimate
 from steadyslip.machine.slider import Slider
 
 UNITS = {"displacement": "mm", "m": "um", "m/s": "um/s", "Pa": "MPa", "Pa/m": "GPa/m"}
-"""Units of the table, by name of a column or by SI unit; other columns keep the SI unit."""
+"""Unit in the table for a name of a column or for an SI unit; other columns keep the SI unit."""
 TIME_DIGITS, DIGITS = 7, 4
-"""Significant digits of times (to 0.1 s at some 10 000 s into a record) and of other numbers that are not estimates."""
+"""Significant digits of times (which give 0.1 s at 100 000 s into a record), and of other numbers except estimates."""
 TYPESET = {one: f"\\{one}" for one in "_%&#$"} | {
     "±": r"$\pm$", "−": "$-$", "×": r"$\times$", "²": "$^2$", "<": "$<$", ">": "$>$",
     "α": r"$\alpha$", "μ": r"$\mu$", "σ": r"$\sigma$", "Σ": r"$\Sigma$", "Θ": r"$\Theta$", "τ": r"$\tau$",
 }  # fmt: skip
-"""LaTeX source of characters that LaTeX reserves or lacks."""
+"""LaTeX source for characters that have a special meaning in LaTeX or that it lacks."""
 GREEK = ("alpha", "beta", "gamma", "eta", "mu", "psi", "sigma", "tau", "theta")
 
 
 def tabular(heads: Sequence[str], rows: Sequence[Sequence[str]], notes: Sequence[str], comment: str) -> str:
-    """LaTeX source of a ``tabular`` below a comment; the last row is set apart, numbered notes come below the table."""
+    """LaTeX source of a comment, a ``tabular`` with a line above its last row, and numbered notes below the table."""
     lines = [" & ".join(cells) + r" \\" for cells in rows]
     body = [f"% {comment}", rf"\begin{{tabular}}{{ll{'r' * (len(heads) - 2)}}}", r"\hline",
             " & ".join(heads) + r" \\", r"\hline", *lines[:-1], r"\hline", lines[-1], r"\hline",
@@ -75,7 +75,10 @@ def escaped(text: str) -> str:
 
 
 def value_with_error(one: Estimate | None) -> str:
-    """Value and error in the unit of the table, rounded to two digits of the error; -- for None."""
+    """LaTeX text of value ± error in the unit of the table, rounded to two digits of the error; -- for None.
+
+    A value that the fit does not determine is in parentheses, and a value without error stands alone.
+    """
     if one is None:
         return "--"
     factor = unit(_unit_in_table(one.unit))[0]

@@ -31,10 +31,10 @@ from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
-WIDTH = 100  # characters of a line of text
+WIDTH = 100  # largest number of characters in a line of text
 SCREENING_EFFORT = 0.1  # share of the effort for a first fit of each law; laws that may be the best get the full effort
-MAX_SSQ_RATIO = 2.0  # laws above this multiple of the least sum of squares cannot become the best by a longer search
-MIN_SHOWN_RATIO = 2.0  # ratio of sums of squares above which text gives the ratio, below the percentage
+MAX_SSQ_RATIO = 2.0  # laws above this multiple of the least sum of squares do not get a longer search
+MIN_SHOWN_RATIO = 2.0  # the text gives ratios of sums of squares above this number, and percentages below it
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class LawComparison(Displayed):
     fits : dict of str to Fit
         Fits by label.
     criteria : dict of str to (float, float)
-        AIC and BIC by label, with the same number of independent samples for all.
+        AIC and BIC by label, computed with the same number of independent samples for all models.
     left_out : tuple of str
         Labels of models that were not fitted before Ctrl-C.
     refused : tuple of str
@@ -71,8 +71,8 @@ class LawComparison(Displayed):
     def best(self) -> str:
         """Label of the model with the least BIC, which penalises additional parameters.
 
-        A model that is ahead only because it assumes that there is no memory of normal stress, which the records leave
-        open, comes behind the next model in which this memory is free.
+        If the records do not decide whether friction has a memory of normal stress, a model without this memory is
+        ranked behind the next model in which the memory is free.
         """
         return next(iter(self.fits))
 
@@ -104,7 +104,7 @@ class LawComparison(Displayed):
 
     @property
     def verdict(self) -> str:
-        """Sentence that names the best model and its lead over the next; empty for a single model."""
+        """Sentence that names the best model and its lead over the next model; empty for a single model."""
         best, *others = self.fits
         if not others:
             return ""
@@ -139,12 +139,12 @@ class LawComparison(Displayed):
 
 
 def _taken_as_none(one: Fit) -> set[str]:
-    """Names of parameters that a fit lacks although they would affect it, such as a memory of normal stress."""
+    """Names of parameters that a model lacks although they would affect it, such as a memory of normal stress."""
     return {name for own in one.unidentified for name in own.weights} - set(one.names)
 
 
 def _agreement(one: Fit, other: Fit) -> str:
-    """Clause on the numbers on which two fits agree: both determine them, each within the interval of the other."""
+    """Clause that names the numbers on which two fits agree: the value of each fit is in the other's interval."""
     both = {own.name for own in (*one.estimates, *one.derived)}
     pairs = [(one[e.name], e) for e in (*other.estimates, *other.derived) if e.name in both and e.unit != "s"]
     agreed = [a.name for a, b in pairs if a.determined and b.determined and a.low <= b.value <= a.high
@@ -159,7 +159,7 @@ def compare(fits: Mapping[str, Fit]) -> LawComparison:
     """Comparison of fits to the same records by information criteria.
 
     The number of independent samples is estimated from the residuals of the fit with the least sum of squares and used
-    for all fits: a model that leaves more structure in its residuals must not profit from it.
+    for all fits: a model must not seem better because it leaves more structure in its residuals.
 
     Parameters
     ----------
@@ -216,9 +216,9 @@ def compare_laws(
         another memory of normal stress; everything else is kept.
     records : Record or sequence of Record
     laws : sequence of str, optional
-        Labels of laws, such as ``aging``, ``slip, two states``, ``aging, linker-dieterich`` or ``prakash-clifton``. A
-        label changes the law of the rig only in what it names. By default a few usual laws; if the normal stress
-        changes in the records, with each memory of normal stress.
+        Labels of laws, such as ``aging``, ``slip, two states``, ``aging, linker-dieterich`` or ``prakash-clifton``. Of
+        the rig's law, only the parts that a label names are changed. By default a few usual laws are compared; if the
+        normal stress changes in the records, each of them with every memory of normal stress.
     **options
         As for `fit`. Parameters in ``free``, ``fixed`` and ``separate`` that a law does not have are ignored for it;
         parameters that the rig's law does not have are free. Ctrl-C compares the laws fitted so far, if there are at
@@ -272,7 +272,7 @@ def compare_laws(
 
 
 def _may_be_missed(one: Fit) -> bool:
-    """True if a search with more work might find a better minimum: its budget was spent before enough starts agreed."""
+    """True if a longer search might find a better minimum: the search ended before enough starts agreed on one."""
     return one.search.cut and (one.search.is_chance or not one.search.converged)
 
 
@@ -283,7 +283,7 @@ def _candidates(fits: Mapping[str, Fit]) -> list[str]:
 
 
 def _usual_labels(rig: Slider, records: Sequence[Record]) -> tuple[str, ...]:
-    """Labels of the laws compared by default; with each memory of normal stress, if that changes in a record."""
+    """Labels of the laws compared by default; with every memory of normal stress, if the stress changes in a record."""
     law = rig.friction
     imposed = rig.contact.is_imposed() or rig.contact.has_pores()
     if not (imposed and any(record.stress_changes for record in records)):
@@ -292,7 +292,7 @@ def _usual_labels(rig: Slider, records: Sequence[Record]) -> tuple[str, ...]:
 
 
 def _options_of(rig: Slider, other: Slider, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options of a fit for a rig `other` with another law: parameters that it lacks are dropped, new ones are free."""
+    """Options of a fit for `other`, a rig with another law: parameters it lacks are left out, and new ones are free."""
     before, after = (set(can_be_free(each)) for each in (rig, other))
     found = dict(options)
     for key in ("free", "fixed", "separate"):
@@ -311,7 +311,7 @@ def _full_name(name: str, known: Iterable[str]) -> str:
 
 
 def with_law(rig: Slider, label: str) -> Slider:
-    """Rig with another friction law, which a label names, such as ``"aging, two states"``."""
+    """Rig with the friction law that a label names, such as ``"aging, two states"``."""
     known = rig.friction.alternatives()
     if not known:
         raise ParameterError(

@@ -1,7 +1,7 @@
 """Estimates and covariances of fits in the coordinates of a population: logarithms of parameters, and a − b.
 
-Rocks whose a and b differ much may have nearly the same a − b, which decides their stability. Therefore a − b takes the
-place of b: its small spread would be lost in the large spreads of a and b.
+Rocks with very different a and b may have nearly the same a − b, which decides their stability. Therefore a − b takes
+the place of b as a coordinate: the small spread of a − b would be lost in the large spreads of a and b.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class MemberQuantity:
     ----------
     name, unit : str
     logarithmic : bool
-        True if spreads and slopes are of the logarithm.
+        True if spreads and slopes are those of the logarithm of the value.
     parts : tuple of (Unknown, int, float)
-        Terms whose sum is the value: unknown, index of its coordinate, and sign of each.
+        For each term of the sum that is the value: unknown, index of its coordinate, and sign.
     """
 
     name: str
@@ -50,7 +50,7 @@ class MemberQuantity:
         return np.asarray(sum(sign * one.value(coordinates[..., k]) for one, k, sign in self.parts))
 
     def gradient(self, coordinates: Array) -> Array:
-        """Derivatives (..., p) by the coordinates, of the value or, if `logarithmic`, of its logarithm."""
+        """Derivatives (..., p) of the value or, if `logarithmic`, of its logarithm, by the coordinates."""
         found = np.zeros_like(coordinates)
         for one, k, sign in self.parts:
             found[..., k] = 1.0 if self.logarithmic else sign * one.slope(coordinates[..., k])
@@ -58,7 +58,7 @@ class MemberQuantity:
 
 
 class Axes:
-    """Coordinates of the experiments of a population: those of fits, but with a − b in place of the first b.
+    """Coordinates of the experiments of a population: the coordinates of fits, but with a − b in place of the first b.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class Axes:
             self.effects = []
 
     def __getitem__(self, name: str) -> MemberQuantity:
-        """Quantity of a name; leading parts of the name may be left out, and ``b - a`` is the negative of ``a - b``."""
+        """Quantity with a name, whose leading parts may be left out; ``b - a`` is the negative of ``a - b``."""
         plain = name.replace(" ", "").replace("−", "-")
         if plain not in ("a-b", "b-a") or DIFFERENCE not in self.quantities:
             return self.quantities[resolve(name, self.quantities)]
@@ -145,7 +145,7 @@ class Axes:
 
 
 def shared_names(fits: Mapping[str, Fit], names: Sequence[str] | None) -> tuple[str, ...]:
-    """Full names of the parameters of a population; by default those of friction that are fitted in every fit."""
+    """Full names of a population's parameters; by default the friction parameters that are fitted in every fit."""
     every = dict.fromkeys(name for one in fits.values() for name in one.names if "@" not in name)
     if names is None:
         found = [n for n in every if n.startswith("friction.") and all(n in one.names for one in fits.values())]
@@ -157,7 +157,7 @@ def shared_names(fits: Mapping[str, Fit], names: Sequence[str] | None) -> tuple[
 
 
 def problems_together(fits: Mapping[str, Fit]) -> list[Problem]:
-    """Problems of fits that make no population: different laws or reference velocities, or the same record twice."""
+    """Problems of fits that cannot form a population: other laws or reference velocities, or the same record twice."""
     rigs = {label: one.plan.rig for label, one in fits.items()}
     if len({type(rig.friction) for rig in rigs.values()}) > 1:
         return [Problem("fits", "are of several friction laws; allowed: one")]
@@ -181,7 +181,7 @@ def problems_together(fits: Mapping[str, Fit]) -> list[Problem]:
 
 
 def labelled(fits: Sequence[Fit]) -> dict[str, Fit]:
-    """Fits by the file names of their first records, made unique."""
+    """Fits by the file name of their first record; a number is added to names that occur twice."""
     found: dict[str, Fit] = {}
     for i, one in enumerate(fits, start=1):
         label = one.plan.records[0].source.replace("\\", "/").rpartition("/")[2] if isinstance(one, Fit) else str(i)
@@ -190,7 +190,7 @@ def labelled(fits: Sequence[Fit]) -> dict[str, Fit]:
 
 
 def conditions_of(fits: Mapping[str, Fit], given: Any) -> dict[str, Array]:
-    """Conditions (experiments,) by name, from the user's lists of numbers or mappings of labels to numbers."""
+    """Values (experiments,) of each condition, from the user's lists of numbers or mappings of labels to numbers."""
     if given is None:
         return {}
     if given == STRESS:

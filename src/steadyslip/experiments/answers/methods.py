@@ -1,4 +1,4 @@
-"""Sentences for the methods section of a paper: law, loading, free parameters and options of the fits of a table."""
+"""Sentences for the methods section of a paper: law, loading, free parameters and options of the fits in a table."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ DRIVEN = {
     "protocol": "the given protocol",
     "smoothed": "a smooth curve through the measured displacement",
 }
-"""Loading of the model by the option `drive` of a fit; with other options it is found in the record."""
+"""Text on the loading of the model for values of a fit's option `drive`; for other values, the record gives it."""
 
 
 def methods_text(fits: Sequence[Fit], estimates: Sequence[Mapping[str, Estimate]], has_notes: bool) -> str:
-    """Sentences on fits of single steps and, last, of all records together.
+    """Sentences on fits to single steps and, as the last of `fits`, a fit to all records together.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def _law(rig: Slider) -> str:
 
 
 def _options(plan: Plan) -> list[str]:
-    """Sentences on the loading, the trend and the beginning of the records; empty texts where nothing is to say."""
+    """Sentences on the loading, the trend and the beginning of the records; empty texts for unused options."""
     changes = [one for loading in plan.loading if loading.load for one in loading.load.changes]
     late = [one for one in changes if one.lag]
     return [
@@ -92,7 +92,7 @@ def _options(plan: Plan) -> list[str]:
 
 
 def _weighing(plan: Plan) -> list[str]:
-    """Sentences on a robust loss and on weights of samples; empty texts where nothing is to say."""
+    """Sentences on a robust loss and on weights of samples; empty texts for unused options."""
     is_uneven = plan.weights is not None and any(np.ptp(row) > 0 for row in plan.weights)
     weights = "Samples were weighted." if is_uneven else "Records weigh by their noise."
     return [
@@ -102,7 +102,7 @@ def _weighing(plan: Plan) -> list[str]:
 
 
 def _structure(fits: Sequence[Fit]) -> str:
-    """Sentence on the number of fits whose residuals are not white; empty if there are none."""
+    """Sentence on the number of fits whose residuals are not white; empty if all residuals are white."""
     left = sum(one.whiteness.p < STRUCTURE for one in fits)
     if not left:
         return ""

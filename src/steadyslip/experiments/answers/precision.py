@@ -37,7 +37,7 @@ from steadyslip.protocol import (
     VelocityStep,
 )
 
-SAMPLES = 4000  # default number of samples; errors fall with its square root
+SAMPLES = 4000  # default number of samples; errors are in inverse proportion to its square root
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +223,7 @@ def best_protocol(
         Experiments by label; by default changes of the normal stress of several shapes, with and without a velocity
         step.
     parameter : str, optional
-        Name of the parameter; by default the one that sets how friction responds to changes of the normal stress.
+        Name of the parameter; by default the parameter that sets the response of friction to changes of normal stress.
     **options
         As for `precision`.
 
@@ -265,8 +265,8 @@ def best_protocol(
 def normal_stress_protocols(rig: Slider, share: float = 0.05) -> dict[str, Protocol]:
     """Protocols that change the normal stress, by the label of their shape.
 
-    Times are multiples of the time in which the rig slides its slip distance; `share` is the relative change of the
-    normal stress.
+    Times are multiples of the time in which the rig slides the slip distance of its law; `share` is the relative change
+    of the normal stress.
     """
     level = steady_state(rig).normal_stress
     size = share * level
@@ -287,7 +287,7 @@ def normal_stress_protocols(rig: Slider, share: float = 0.05) -> dict[str, Proto
 
 
 def _slip_time(rig: Slider) -> float:
-    """Time in which the rig slides its largest slip distance, s."""
+    """Time (s) in which the rig slides the largest of its law's slip distances."""
     distances = [value for name in rig.of_kind("slip distance") if (value := rig.value(name)) is not None]
     if not distances:
         raise NotAvailable("this friction law has no slip distance to scale experiments with; give candidates")

@@ -31,10 +31,11 @@ COUNT = 4000  # default number of draws: errors of a probability are below 1 %
 KICK_DRAWS = 200  # number of draws for which thresholds of kicks are computed by simulation
 LEVELS = (0.025, 0.16, 0.5, 0.84, 0.975)  # probabilities of the quantiles: median, 68 % and 95 % intervals
 EFFECT, ROUNDING = 0.05, 1e-9
-"""Relative change of a parameter in the test of its effect, and largest relative change of an unaffected result."""
+"""A parameter has no effect on a result if changing it by the first number, as a share, changes the result by less than
+the second number."""
 DECISIVE = ("direct effect", "evolution effect", "slip distance")
 """Kinds of parameters that decide stability: they must be fitted and are never taken from the file of the rig."""
-CLEAR_PROBABILITY = 0.95  # the text says stable or unstable from this probability on
+CLEAR_PROBABILITY = 0.95  # the text says stable or unstable if the probability is at least this number
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +59,11 @@ class Prediction(ReadOnly):
     growth_rate : ndarray (m,)
         Growth rate of the least stable mode, 1/s.
     thresholds : dict of str to ndarray
-        Smallest kicks after which sliding does not become steady again, by kind of kick, in the units of `Threshold`;
-        for the first draws only.
+        For each kind of kick, size of the smallest kick after which sliding does not become steady again, in the units
+        of `Threshold`; for the first draws only.
     shares : dict of str to float
-        Share of the variance of the critical stiffness (or growth rate, if there is no critical stiffness) that would
-        vanish if a parameter, or b − a, were known exactly, by name.
+        For each parameter, and for b − a: share of the variance of the critical stiffness that would vanish if it were
+        known exactly. Without a critical stiffness, share of the variance of the growth rate.
     left_out : tuple of str
         Kinds of kick that were not computed before Ctrl-C.
     """
@@ -85,11 +86,11 @@ class Prediction(ReadOnly):
 
     @property
     def dominant(self) -> str | None:
-        """Parameter whose uncertainty contributes most; None if no share is known."""
+        """Name of the parameter with the largest of `shares`; None if no share is known."""
         return next(iter(self.shares), None)
 
     def quantiles(self, values: Array) -> tuple[float, ...]:
-        """Quantiles of the finite values at 2.5, 16, 50, 84 and 97.5 %; NaN if there are none."""
+        """Quantiles of the finite values at 2.5, 16, 50, 84 and 97.5 %; NaN if no value is finite."""
         finite = values[np.isfinite(values)]
         return tuple(float(q) for q in np.quantile(finite, LEVELS)) if len(finite) else (float("nan"),) * len(LEVELS)
 
@@ -131,12 +132,12 @@ class Prediction(ReadOnly):
 
     @property
     def kept(self) -> dict[str, float]:
-        """Values of friction parameters that the population lacks and that are taken from the rig, by name."""
+        """Values, by name, of friction parameters that are taken from the rig because the population lacks them."""
         return _kept(self.rig, self.draws) if isinstance(self.draws, Population) else {}
 
     @property
     def undecided(self) -> dict[str, float]:
-        """Share of the draws with steady sliding for which the threshold is undecided, by kind of kick."""
+        """For each kind of kick, share of draws that have steady sliding but for which the threshold was not found."""
         return {
             kick: float(np.mean(np.isnan(sizes) & self.exists[: len(sizes)])) for kick, sizes in self.thresholds.items()
         }
@@ -201,16 +202,16 @@ def predict(
     ----------
     rig : Slider
         The machine or fault to predict. Its friction is replaced by the fitted friction; its memory of normal stress is
-        kept if the fit has none.
+        kept if the fitted friction has no such memory.
     fit : Fit, Draws or Population
-        Draws from `bootstrap` or `posterior`; or a fit, for normal draws with its covariance; or a population, for the
-        friction in one more experiment on its rock (at mean conditions unless set by `Population.at`).
+        Draws from `bootstrap` or `posterior`; or a fit, from which normal draws are made with its covariance; or a
+        population, for the friction of a new experiment on its rock (at mean conditions or those of `Population.at`).
     kick : str or sequence of str, optional
         Kinds of kick for which to compute thresholds, as for `steadyslip.threshold`.
     transfer : sequence of str, optional
-        Further fitted parameters that hold for the rig, such as ``slider.stiffness`` for the machine of the records.
+        Further fitted parameters to use in the rig, such as ``slider.stiffness`` if it is the machine of the records.
     record : int, optional
-        Index of the record whose parameters to take, if some differ between records.
+        Index of the record whose parameters are used, if some parameters differ between records.
     count : int, optional
         Number of draws from the covariance of a fit.
     seed : int, optional
@@ -243,10 +244,10 @@ def transferred(
     rig: Slider, fit: Fit | Draws | Population, transfer: Sequence[str] = (), record: int = 0, count: int = COUNT,
     seed: int = 0, *, linear: bool = False,
 ) -> tuple[Slider, Draws | Population, dict[str, Array]]:  # fmt: skip
-    """Rig with the best fitted friction, the draws, and drawn values (m,) by parameter of the rig; see `predict`.
+    """Rig with the best fitted friction, the draws, and drawn values (m,) of each fitted parameter of the rig.
 
-    A friction parameter that the fit does not determine raises `NotAvailable`, unless only linear stability is wanted
-    (`linear`) and the parameter has no effect on it.
+    Arguments are those of `predict`. A friction parameter that the fit does not determine raises `NotAvailable`, unless
+    `linear` is true and the parameter has no effect on linear stability.
     """
     source = _source(fit)
     target = with_fitted_friction(rig, source, record)
@@ -287,9 +288,9 @@ def transferred(
 
 
 def _kept(rig: Slider, rock: Population) -> dict[str, float]:
-    """Values, from the rig, of friction parameters that a population lacks, by name; only if they hardly matter.
+    """Values, from the rig, of friction parameters that a population lacks and that do not decide stability, by name.
 
-    The level of friction may come from the rig's file; a, b and d_c in it would be those of another rock.
+    The rig's file may give the level of friction, but its a, b and d_c would be those of another rock.
     """
     fitted = {one.parameter for one in _source(rock).space.unknowns} - {
         one.name for one in rock.axes.quantities.values()
@@ -302,12 +303,12 @@ def _kept(rig: Slider, rock: Population) -> dict[str, float]:
 
 
 def _source(fit: Fit | Draws | Population) -> Fit:
-    """Fit that gives the friction law of a prediction."""
+    """Fit whose friction law a prediction uses: the fit itself, the fit of the draws, or the first of a population."""
     return fit if isinstance(fit, Fit) else fit.fit if isinstance(fit, Draws) else next(iter(fit.fits.values()))
 
 
 def _without_effect(target: Slider, names: Mapping[str, str]) -> set[str]:
-    """Keys of `names` whose parameters of the rig affect neither its growth rate nor its critical stiffness."""
+    """Keys of `names` that stand for parameters without effect on the rig's growth rate and critical stiffness."""
     found = set()
     for key, name in names.items():
         value = target.value(name) or 1.0
@@ -346,7 +347,7 @@ def with_fitted_friction(rig: Slider, fit: Fit, record: int = 0) -> Slider:
 
 
 def _difference(rig: Slider, vary: dict[str, Array]) -> dict[str, Array]:
-    """Draws (m,) of b − a by label; it decides stability more than b or a alone. Empty if neither was fitted."""
+    """Draws (m,) of b − a, by its label, as it decides stability more than a or b; empty if neither was fitted."""
     direct, evolved = rig.of_kind("direct effect"), rig.of_kind("evolution effect")
     if not direct or not evolved or not {*direct, *evolved} & set(vary):
         return {}
@@ -372,7 +373,7 @@ def _shares(vary: dict[str, Array], critical: Array, growth: Array) -> dict[str,
 
 
 def probability_text(share: float, count: int) -> str:
-    """Probability as text, no finer than `count` draws allow: with no event among them it is below 3 / count (95 %)."""
+    """Probability as text, as precise as `count` draws allow: below 3 / count (95 % confidence) without an event."""
     if share >= 1:
         return f"more than {100 * (1 - 3 / count):.4g} %"
     if share <= 0:

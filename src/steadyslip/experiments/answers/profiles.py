@@ -1,4 +1,4 @@
-"""Likelihood profiles: least sum of squares with one parameter held at each of several values."""
+"""Likelihood profiles: least sum of squares with one parameter fixed at each of several values."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
 
-LEVEL = 0.95  # probability of the intervals that are compared
+LEVEL = 0.95  # probability of the intervals from a profile and from the error of the fit that are compared
 END_TOLERANCE = 0.15
-"""Largest difference between interval ends by a Gaussian profile and by the fit's error, over half the width."""
+"""Largest difference between the ends of these two intervals of a Gaussian profile, over half the width."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class Profile(ReadOnly):
 
     @property
     def gaussian(self) -> bool:
-        """True if the 95 % interval is nearly that of the fit's error."""
+        """True if the 95 % interval from the profile nearly equals the interval from the error of the fit."""
         if not np.all(np.isfinite(self.normal)):
             return False
         own, usual = np.array(self._ends(self.rise, LEVEL)), np.array(self._ends(self.normal, LEVEL))
@@ -109,15 +109,15 @@ class Profile(ReadOnly):
 
 @checked(reach=finite(0, 1e6), count=whole(2, 10**5), threads=THREADS, name=NAME)
 def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads: int | None = None) -> Profile:
-    """Likelihood profile of a parameter: all others are fitted again at each of its values.
+    """Likelihood profile of a parameter: at each of its values, all other parameters are fitted again.
 
     Parameters
     ----------
     fit : Fit
     name : str
     reach : float
-        Range on both sides in standard deviations. If the parameter is not determined, the range is 2 e-folds, or 2
-        natural sizes of a parameter of any sign.
+        Range on both sides of the estimate in standard deviations. If the fit does not determine the parameter, the
+        range is a factor exp(2), or for a parameter that may be negative two typical sizes (0.01 for b).
     count : int
         Number of values.
     threads : int, optional
@@ -141,7 +141,7 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
     width = np.sqrt(variance) * reach if np.isfinite(variance) else 2.0
     z = np.tile(fit.coordinates, (count, 1))
     z[:, i] = fit.coordinates[i] + width * np.linspace(-1, 1, count)
-    if np.isfinite(variance):  # start the other coordinates at their expected values for the given covariance
+    if np.isfinite(variance):  # the covariance predicts the other coordinates at each value: start there
         slope = fit.covariance[:, i] / variance
         slope[~np.isfinite(slope)] = 0.0
         z = fit.coordinates + (z[:, i : i + 1] - fit.coordinates[i]) * slope
@@ -163,7 +163,7 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
 
 
 def _unit_of_rise(fit: Fit, i: int) -> float:
-    """Rise of the sum of squares at one standard deviation of parameter i, for the noise and the uncertain loading."""
+    """Rise of the sum of squares one standard deviation of parameter i from the minimum; its error has all causes."""
     _, jacobian = fit.comparison.residuals(fit.coordinates[None])
     rows = jacobian[0]
     inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-13, hermitian=True)

@@ -1,4 +1,4 @@
-"""Table for a paper: fits of every step of the records alone and of all together, with text for the methods section."""
+"""Table for a paper: a fit to every step of the records and a fit to all records, with text for the methods section."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ from steadyslip.machine.slider import Slider
 ABOUT = {"record": "", "step": "", "time": "s", "displacement": "m", "rate before": "m/s", "rate after": "m/s",
          "normal stress": "Pa", "samples": "", "rms": "1"}  # fmt: skip
 """Columns before those of the estimates, with SI units."""
-PRINTED, LABEL = 120, 20  # characters of a line of a printed table, and of a file's name in it
-PLAIN = ("velocity step", "normal-stress step", "hold")  # kinds of steps not named in print: units make them clear
+PRINTED, LABEL = 120, 20  # largest number of characters in a line of a printed table, and in a file's name in it
+PLAIN = ("velocity step", "normal-stress step", "hold")  # kinds of steps that are not named in print: units show them
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class FittedStep:
         None for the fit to all records together.
     fit : Fit
     displacement, normal_stress : float or None
-        Displacement of the load point since the beginning of the record (m), and effective normal stress (Pa), when
-        the step begins; None if not measured.
+        Displacement of the load point since the beginning of the record (m), and effective normal stress (Pa), both at
+        the beginning of the step; None if not measured.
     rates : tuple of two float or None
         Rate of the load point before and after the step, m/s.
     """
@@ -65,7 +65,7 @@ class FittedStep:
     rates: tuple[float | None, float | None] = (None, None)
 
     def about(self) -> dict[str, Any]:
-        """Values by name of the columns `ABOUT`; None if a line has no value."""
+        """Values of the columns in `ABOUT`, by name; None for a column without a value in this line."""
         step = self.step
         kind = "all together" if step is None else step.kind
         kind += f" to {format_quantity(step.after, 'Pa')}" if step is not None and step.unit == "Pa" else ""
@@ -84,12 +84,12 @@ class FittedStep:
         return f"{name if len(name) <= LABEL else '...' + name[3 - LABEL :]}, {when}"
 
     def verdict(self, notes: list[str]) -> str:
-        """Text "weakens" or "strengthens" with velocity, by a − b and its interval, and the numbers of its warnings.
+        """Text "weakens" or "strengthens" (with velocity), from a − b and its interval, and numbers of warnings.
 
         Parameters
         ----------
         notes : list of str
-            Warnings of the whole table, which are numbered in this order.
+            All warnings of the table; their order gives the numbers.
         """
         numbers = ",".join(str(1 + notes.index(text)) for text in warnings(self.fit))
         found = next((one for one in self.fit.derived if one.name.startswith("a - ")), None)
@@ -115,7 +115,7 @@ class StepTable(Displayed):
     Attributes
     ----------
     lines : tuple of FittedStep
-        One for each step, in order of records and time; the last line is the fit to all records together.
+        One line for each step, in order of records and time; the last line is the fit to all records together.
     left_out : tuple of str
         Sentences on steps that could not be fitted alone.
     """
@@ -213,7 +213,7 @@ class StepTable(Displayed):
         return methods_text(fits, [line.estimates() for line in self.lines], bool(self.notes))
 
     def _rows(self) -> tuple[list[list[str]], list[str]]:
-        """Rows of the printed table, the first with names, and names of the estimates for which a line is too short."""
+        """Rows of the printed table, with names in the first row; names of estimates that do not fit into a line."""
         notes, level = self.notes, self.joint.plan.rig.of_kind("friction level")
         own = [line.estimates() for line in self.lines]
         verdicts = [line.verdict(notes) for line in self.lines]
@@ -251,9 +251,9 @@ def step_table(
 ) -> StepTable:  # fmt: skip
     """Table of fits to every step of a fit's records alone, with the rig and options of the fit.
 
-    The part of a step begins halfway between it and the step before, and ends at the next step. Friction and state at
-    the beginning of a part follow from the fit to the step before, with its errors; or from the fit to all records, if
-    the step before does not determine all parameters.
+    A step is fitted to the part of its record from halfway between the step before and this step until the next step.
+    Friction and state at the beginning of this part, with errors, follow from the fit to the step before; or from the
+    fit to all records, if the step before does not determine all parameters.
 
     Parameters
     ----------
@@ -311,9 +311,9 @@ def step_table(
 
 
 def _without_memory(fit: Fit, record: int) -> tuple[Slider, tuple[str, ...]]:
-    """Rig with the memory of normal stress held as fitted to all records, and names of the other free parameters.
+    """Rig with the memory of normal stress fixed as fitted to all records, and names of the other free parameters.
 
-    It serves a step at constant normal stress, on which the memory has no effect.
+    The rig is used for steps at constant normal stress, on which the memory has no effect.
     """
     plan = fit.plan
     fields_of = tuple(f"friction.{name}." for name in plan.rig.friction.decided_by_stress)
@@ -324,7 +324,7 @@ def _without_memory(fit: Fit, record: int) -> tuple[Slider, tuple[str, ...]]:
 
 
 def _parts(record: Record) -> Iterator[tuple[LoadStep, Record]]:
-    """Steps of a record, each with the part from halfway since the change before until the next step."""
+    """Steps of a record, and for each the part of the record from halfway after the change before to the next step."""
     changes = [step.time for step in record.steps]
     steps = [step for step in record.steps if step.kind != "reslide"]
     ends = [*(_beginning_of(record, step) for step in steps[1:]), np.inf]
@@ -347,7 +347,7 @@ def _begun(before: tuple[Fit, int], plan: Plan) -> dict[str, Any]:
     Parameters
     ----------
     before : tuple of Fit and int
-        A fit whose record, of this index, contains the beginning: friction, state and their errors follow from it.
+        A fit, and the index of one of its records that contains the beginning: it gives friction, state and errors.
     plan : Plan
         Plan of the new fit.
     """
@@ -361,7 +361,7 @@ def _begun(before: tuple[Fit, int], plan: Plan) -> dict[str, Any]:
     source, target = fit.comparison.parts[i], plan.comparison().parts[0]
     given = {one.parameter: values[:, k] for k, one in enumerate(fit.space.unknowns) if one.record in (None, i)}
     own = np.empty((len(values), len(plan.space())))
-    for k, one in enumerate(plan.space().unknowns):  # times of changes do not matter to what was before
+    for k, one in enumerate(plan.space().unknowns):  # times of changes have no effect on friction before the changes
         own[:, k] = given[one.parameter] if one.parameter in plan.free else 0.5 * (one.low + one.high)
     at = int(np.argmin(np.abs(source.record.time - target.record.time[0])))
     steady = target.states(own)
@@ -379,7 +379,7 @@ def _fitted_step(record: Record, step: LoadStep, alone: Fit) -> FittedStep:
                      for own in (record.displacement, record.normal))  # fmt: skip
     if moved is not None and record.displacement is not None:
         moved -= float(record.displacement[0])
-    if step.kind.startswith("normal"):  # its samples lie on both sides of the step
+    if step.kind.startswith("normal"):  # a mean over samples would mix both sides of a normal-stress step
         normal = step.before
     load = record.loading.load
     rates = (step.before, step.after) if step.unit == "m/s" else (None, None)

@@ -28,18 +28,20 @@ from steadyslip.experiments.numerics.pooling import run_walkers, spread_of_chain
 from steadyslip.files.result_tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.files.sealed import FileKind
 
-REFITS_AT_ONCE = 32  # refits at a time: four SIMD vectors of eight lanes, which bounds the memory
+REFITS_AT_ONCE = 32  # number of refits at a time: four SIMD vectors of eight lanes; it limits the memory
 BOOTSTRAPS = ("auto", "block", "residual")
 REFIT_TOLERANCE = 1e-6
-"""A refit stops at a smaller predicted relative decrease of the sum of squares, which scatters more between refits."""
+"""A refit stops if the predicted relative decrease of its sum of squares is smaller: the scatter between refits is far
+larger."""
 BLOCK = 10.0
-"""Length of a block, in numbers of correlated samples worth an independent one: 5 % of the variance of sums is lost."""
-MAX_BLOCK_SHARE = 0.1  # longest block, as a share of the record: longer blocks would be too few to resample
+"""Length of a block, as a multiple of the number of correlated samples that carry as much information as an independent
+sample. Blocks of this length lose 5 % of the variance of sums."""
+MAX_BLOCK_SHARE = 0.1  # largest length of a block, as a share of the record: fewer blocks are too few to resample
 MIXED, FEWEST_TIMES = 1.1, 20
-"""Chains have mixed below this R-hat and after this number of autocorrelation times; chosen by trial for many walkers,
-each with few draws."""
-FEWEST = 40  # number of draws from which one lies beyond each end of a 95 % interval
-MOST_POINTS = 5e7  # most numbers in an array of draws × samples: half a gigabyte
+"""Chains have mixed if R-hat is below the first number and they are longer than the second number of autocorrelation
+times; chosen by trial for many walkers with few draws each."""
+FEWEST = 40  # least number of draws: with 40, one draw is beyond each end of a 95 % interval
+MOST_POINTS = 5e7  # largest number of values in an array (draws, samples): half a gigabyte
 DRAWS = FileKind("draws", 1, 2**30, "draw them again and save them anew")
 _ATTRIBUTES = {"kind": str, "about": str, "chains": int}
 _ABOUT = {"details": {str: float}, "interrupted": bool, "weighed": bool}
@@ -63,9 +65,9 @@ class Draws(ReadOnly):
     interrupted : bool
         True if Ctrl-C came before all draws were made.
     chains : int
-        Number of chains, one after another and equally long; 1 if the draws are independent.
+        Number of chains, which are equally long and follow each other in the draws; 1 if the draws are independent.
     log_probability : ndarray (m,) or None
-        Logarithm of the probability density up to a constant, where it was computed.
+        Logarithm of the probability density up to a constant; None if it was not computed.
     """
 
     fit: Fit
@@ -95,11 +97,11 @@ class Draws(ReadOnly):
         return self.fit.space.coordinates(np.column_stack([self.values[name] for name in self.fit.names]))
 
     def error(self, name: str) -> float:
-        """Standard deviation, SI units."""
+        """Standard deviation of the draws of a parameter or derived quantity, SI units."""
         return float(np.nanstd(self[name], ddof=1))
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Central interval of probability `level`, SI units."""
+        """Interval of a parameter or derived quantity that holds the central share `level` of its draws, SI units."""
         low, high = np.nanquantile(self[name], [0.5 - level / 2, 0.5 + level / 2])
         return float(low), float(high)
 
@@ -161,8 +163,8 @@ class Draws(ReadOnly):
         ----------
         samples : bool
             True to compute groups with values for each sample of the records: ``observed_data``, ``log_likelihood`` (of
-            each sample given those before it, with the fit's noise) and ``posterior_predictive``. They need much
-            memory: a number for each draw and sample.
+            each sample given the samples before it, with the noise of the fit) and ``posterior_predictive``. These
+            groups need much memory: a number for each draw and sample.
         seed : int
             Seed for the noise in ``posterior_predictive``.
 
@@ -243,7 +245,7 @@ def load_draws(path: str | PathLike[str]) -> Draws:
 def normal_draws(fit: Fit, count: int = 1000, seed: int = 0, *, held: Sequence[str] = ()) -> Draws:
     """Draws of the parameters of a fit from the normal distribution with its covariance.
 
-    The distribution is normal in the logarithms of positive parameters and in the values of others.
+    The distribution is normal in the logarithms of positive parameters and in the values of other parameters.
 
     Parameters
     ----------
@@ -251,12 +253,12 @@ def normal_draws(fit: Fit, count: int = 1000, seed: int = 0, *, held: Sequence[s
     count : int
     seed : int
     held : sequence of str, optional
-        Parameters without effect on the answer: if the fit does not determine them, all draws have its value.
+        Parameters without effect on the result: if the fit does not determine them, all draws have its estimate.
 
     Raises
     ------
     NotAvailable
-        If another parameter is not determined, or the search of the fit was stopped before it ended.
+        If a parameter other than `held` is not determined, or the search of the fit was stopped before it ended.
 
     Examples
     --------
@@ -288,9 +290,9 @@ def bootstrap(
     fit: Fit, count: int = 1000, kind: str = "auto", *, block: int | None = None, seed: int = 0,
     threads: int | None = None, progress: bool | None = None,
 ) -> Draws:  # fmt: skip
-    """Draws of the parameters by bootstrap: fits to the model plus resampled residuals.
+    """Draws of the parameters by bootstrap: fits to the fitted model plus resampled residuals.
 
-    The loading that was found in the records (rates, response of a servo) also varies between draws, by its errors.
+    The loading that was found in the records (rates, response of a servo) is also varied within its errors.
 
     Parameters
     ----------
@@ -299,9 +301,9 @@ def bootstrap(
         Number of refits, each of which starts at the minimum of the fit.
     kind : str
         ``block``: residuals are resampled in blocks, which keeps their correlation; ``residual``: one by one; ``auto``:
-        in blocks if the fit has correlated residuals.
+        in blocks if the residuals of the fit are correlated.
     block : int, optional
-        Number of samples in a block; by default ten times as many as are worth one independent sample.
+        Number of samples in a block; by default ten times the number of samples per independent sample.
     seed : int
     threads : int, optional
     progress : bool, optional
@@ -365,9 +367,9 @@ def bootstrap(
 
 
 def block_length(fit: Fit, record: int, worth: float, kind: str = "block", block: int | None = None) -> int:
-    """Number of samples in a block, for the given kind of bootstrap.
+    """Number of samples in a block of a record, for the given kind of bootstrap.
 
-    Unless `block` is given, it is as long as `worth` samples that are independent, so that blocks are nearly
+    Unless `block` is given, a block carries the information of `worth` independent samples, so that blocks are nearly
     independent of each other.
     """
     noise = fit.noise[record]
@@ -379,14 +381,17 @@ def block_length(fit: Fit, record: int, worth: float, kind: str = "block", block
 
 
 def _scale_of_blocks(residuals: Array, noise: Noise, block: int) -> float:
-    """Factor for residuals that gives means of blocks the variance of the noise; fitted parameters had reduced it."""
+    """Factor by which residuals are multiplied so that block means have the variance of the noise.
+
+    Without it the variance would be too small, because fitted parameters follow part of the noise.
+    """
     sums = np.cumsum(np.concatenate([[0.0], residuals - residuals.mean(), residuals[:block] - residuals.mean()]))
     scatter = float(np.var(sums[block:-1] - sums[: -block - 1])) / block**2
     return float(np.sqrt(noise.variance_of_mean(block) / scatter)) if scatter > 0 else 1.0
 
 
 def _resampled(residuals: Array, block: int, many: int, generator: np.random.Generator) -> Array:
-    """Residuals (many, n) resampled in blocks that begin at random; a block at the end continues at the start."""
+    """Residuals (many, n) resampled in blocks that begin at random; a block past the end continues at the start."""
     size = len(residuals)
     starts = generator.integers(0, size, size=(many, -(-size // block)))
     places = (starts[:, :, None] + np.arange(block)).reshape(many, -1)[:, :size] % size
@@ -398,9 +403,9 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     """Draws of the parameters from their posterior, sampled with emcee.
 
     The likelihood follows from the sum of squares. If residuals are correlated, the coordinates are stretched about
-    the minimum so that the curvature there agrees with the fit's covariance (Ribatet, Cooley & Davison 2012); further
-    out, the shape remains that of the sum of squares. Priors are flat in the logarithms of positive parameters and in
-    the values of others, within the bounds of the fit.
+    the minimum so that the curvature at the minimum agrees with the fit's covariance (Ribatet, Cooley & Davison 2012);
+    the shape of the sum of squares is kept. Priors are flat in the logarithms of positive parameters and in the values
+    of other parameters, within the bounds of the fit.
 
     Parameters
     ----------

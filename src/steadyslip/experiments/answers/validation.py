@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
 
-APART = 3.0  # length of the blocks left out, in numbers of correlated samples that are worth an independent one
+APART = 3.0  # length of the blocks left out, as a multiple of the number of samples per independent sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +25,9 @@ class CrossValidation(ReadOnly):
     Attributes
     ----------
     residuals : ndarray (n,)
-        Data minus prediction by the fit that left the sample out, weighted as in the fit.
+        Data minus prediction by a fit from which the sample was left out, weighted as in the fit.
     fold : ndarray of int (n,)
-        Index of the fold of each sample; samples of one fold are left out together.
+        Index of the fold of each sample; the samples of a fold are left out together.
     block : int
         Number of successive samples in a fold.
     seen : float
@@ -61,19 +61,19 @@ class CrossValidation(ReadOnly):
 def cross_validate(
     fit: Fit, folds: int = 8, *, block: int | None = None, threads: int | None = None
 ) -> CrossValidation:
-    """Prediction errors of samples that are left out of the fit, one part after the other.
+    """Prediction errors of samples that are left out of the fit, one fold of the samples after the other.
 
-    With 8 folds, a part consists of every 8th block of successive samples. Blocks are longer than the correlation of
-    the noise, so that neighbours do not reveal the samples left out, and short enough that every step of the loading
-    remains in the fit.
+    With 8 folds, a fold consists of every 8th block of successive samples. Blocks are longer than the correlation of
+    the noise, so that neighbouring samples do not reveal the samples left out, and short enough that every step of the
+    loading remains in the fit.
 
     Parameters
     ----------
     fit : Fit
     folds : int
-        Number of parts.
+        Number of folds.
     block : int, optional
-        Number of samples in a block; by default three times as many as are worth one independent sample.
+        Number of samples in a block; by default three times the number of samples per independent sample.
     threads : int, optional
 
     Raises

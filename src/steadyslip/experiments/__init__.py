@@ -1,8 +1,9 @@
 """Records of experiments: reading, fits of rigs to them, uncertainty of the fits, and predictions for other rigs.
 
-Does not import verdicts, maps or figures: results are numbers and records.
+This package does not import verdicts, maps or figures: its results are numbers and records.
 
-Names are listed in ``__init__.pyi`` and loaded on first use: the separate process that reads data files needs few.
+Names are listed in ``__init__.pyi`` and loaded on first use, because the separate process that reads data files needs
+few of them.
 """
 
 import lazy_loader

@@ -53,8 +53,8 @@ def fit_files(
     fit : Fit or MachineFit
         The best fit, if laws are compared; a MachineFit if the file describes a machine.
     comparison : LawComparison or None
-        Comparison of the laws that the file lists. If it lists none, the normal stress changes and the file chooses no
-        memory of normal stress, the slip and the aging law are compared with each memory. None for a single law.
+        Comparison of the laws that the file lists. If it lists no laws and chooses no memory of normal stress, and the
+        normal stress changes, the slip and the aging law are compared, each with every memory. None for a single law.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def fit_files(
 
 
 def fitted(plan: Spec | MachineSpec, records: Sequence[Any]) -> tuple[Fit | MachineFit, LawComparison | None]:
-    """Fit to records, or comparison of laws, as the fit file requires; see `fit_files`."""
+    """Fit to records, and comparison of laws if the fit file requires it (else None), as `fit_files` returns them."""
     with progress_text("searching") as said:
         report = _progress_reporter(said)
         if isinstance(plan, Spec) and plan.compared(records):
@@ -92,7 +92,8 @@ def population_files(
     paths : sequence of path
         Files of the records, each of which is a separate experiment.
     spec : path
-        Fit file; its table ``[population]`` names the parameters that differ and the condition on which they depend.
+        Fit file; its table ``[population]`` names the parameters that differ between experiments, and the condition on
+        which these parameters depend.
     changes : iterable of str
         As for `read_spec`.
     skip_bad_lines : bool
@@ -100,7 +101,7 @@ def population_files(
     Returns
     -------
     Population
-        Its experiments have the names of the files as labels.
+        The labels of its experiments are the names of the files.
 
     Raises
     ------
@@ -152,7 +153,7 @@ def population_files(
 
 
 def load_friction(path: str | PathLike[str]) -> Fit | Population:
-    """Saved fit or saved population, whichever the file contains.
+    """Fit or population that was saved in the file.
 
     Raises
     ------
@@ -178,7 +179,7 @@ def records_of(plan: Spec | MachineSpec, paths: Paths, skip_bad_lines: bool) -> 
 
 
 def _of_speeds(path: str | PathLike[str], error: ParameterError | NotAvailable) -> NotAvailable | None:
-    """Error with advice on fitting a table of speeds, if a file without times is such a table; else None."""
+    """Error with advice for a file without times that is a table of friction over speed; None for other files."""
     if isinstance(error, ParameterError) and all(problem.name != "time" for problem in error.problems):
         return None
     try:

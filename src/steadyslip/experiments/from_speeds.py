@@ -46,28 +46,28 @@ def fit_friction_table(
 ) -> SpeedFit:
     """Fit a friction law to friction that was measured at constant speeds.
 
-    Each direction is fitted separately. If there are too few rows for all parameters, some are held: the Stribeck
-    exponent at 2, then the viscosity at 0. If the load differs between rows, a constant load in addition to it and a
-    viscous drag that does not depend on it are fitted too.
+    Each direction is fitted separately. If there are too few rows for all parameters, some are fixed: the Stribeck
+    exponent at 2, then the viscosity at 0. If the load differs between rows, two more parameters are fitted: a constant
+    load that acts in addition, and a viscous drag that does not depend on the load.
 
     Parameters
     ----------
     table : path, or mapping of str to array_like
         File with columns of speed, of force, torque or friction coefficient, and optionally of load and direction; or
-        arrays by these names in SI units, ``{"speed": [...], "force": [...]}``. Negative speeds are backward.
+        arrays by these names in SI units, ``{"speed": [...], "force": [...]}``. Negative speeds are backward motion.
     law : str
         Registered name of a friction law.
     load : float or str, optional
-        Constant load, N, if the table has no column for it. Without any load, coefficients are forces.
+        Constant load, N, if the table has no column for it. Without any load, fitted coefficients are forces.
     loop : path, optional
         Table of displacement and force before sliding, from which the stiffness of bristles follows.
     hold : mapping of str to float or str, optional
         Known parameters of the law, which are not fitted.
     errors : str
         ``"relative"`` if errors are in proportion to the measured friction, such as 1 % of the reading; ``"absolute"``
-        if all have the same size, such as 1 % of full scale.
+        if all errors have the same size, such as 1 % of full scale.
     radius : float or str, optional
-        Radius of the contact, m, for a table of torques: friction in the rig file acts there; by default 1 m.
+        Radius, m, at which friction acts in the rig file, for a table of torques; by default 1 m.
     **columns
         Column or unit by role, if the names of columns do not suffice: ``speed="mm/min"``, ``force="F2"``.
 
@@ -86,8 +86,8 @@ def fit_friction_table(
     Notes
     -----
     An interval contains the values at which the sum of squares, minimised over the other parameters, exceeds its
-    minimum by no more than s² t². The variance s² follows from the residuals; Student's t has as many degrees of
-    freedom as there are more rows than parameters.
+    minimum by no more than s² t². The variance s² follows from the residuals. The number of degrees of freedom of
+    Student's t is the number of rows minus the number of parameters.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def fit_friction_table(
     >>> print(found["mu_coulomb"])
     mu_coulomb = 0.1012 ± 0.00092
     """
-    roles = () if isinstance(table, Mapping | SpeedTable) else UNITS_OF_ROLES  # arrays are named by role already
+    roles = () if isinstance(table, Mapping | SpeedTable) else UNITS_OF_ROLES  # the names of arrays are roles
     refuse_unknown("fit_friction_table", columns, [*roles, *keywords_of(fit_friction_table)])
     if errors not in ERRORS:
         raise ParameterError([Problem("errors", f"got {errors!r}; allowed: {' or '.join(map(repr, ERRORS))}")])
@@ -138,7 +138,7 @@ def fit_friction_table(
 
 
 def _law(name: str) -> Any:
-    """Friction law of a registered name; raises a ParameterError on the argument ``law`` if there is none."""
+    """Friction law with a registered name; raises a ParameterError on the argument ``law`` if there is none."""
     try:
         return find_law(FrictionLaw, name)
     except ParameterError as error:
@@ -146,7 +146,7 @@ def _law(name: str) -> Any:
 
 
 def _held(law: Any, given: Mapping[str, Any]) -> dict[str, float]:
-    """Held parameters of a law in SI units, by name."""
+    """Values, in SI units and by name, of the parameters that are fixed in a fit of a law."""
     found, problems = {}, []
     roles = {item.name: role for item in fields(law) if isinstance(role := role_of(item), Parameter)}
     for name, value in given.items():
@@ -170,7 +170,7 @@ def _number(value: Any) -> Any:
 
 
 def fit_speed_files(files: Sequence[Path], law: str, changes: Sequence[str]) -> SpeedFit:
-    """Fit to the tables given on a command line: one of speeds, and optionally a loop before sliding.
+    """Fit to the tables given on a command line: one table of friction over speed, and optionally a presliding loop.
 
     Raises
     ------

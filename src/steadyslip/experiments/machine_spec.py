@@ -1,4 +1,4 @@
-"""Fit files of machines: rig files with bodies and links, and with tables ``[record]`` and ``[fit]``."""
+"""Fit files of machines: rig files with bodies and links that also have the tables ``[record]`` and ``[fit]``."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class MachineSpec(Displayed):
     population: ClassVar[None] = None
 
     def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> MotionRecord | ResponseData:
-        """Record of a machine, read with the settings of the file: frequency responses, or motions over time."""
+        """Frequency responses, or motions over time, read from a file with the settings of the fit file."""
         if is_response(path):
             return read_frequency_response(path, averages=self.record.averages)
         options = {name: value for name, value in self.record.arguments().items() if name != "averages"}
@@ -71,7 +71,7 @@ class MachineSpec(Displayed):
 
 
 def machine_spec(found: RigFileContents) -> MachineSpec:
-    """MachineSpec from the parts of a file; raises one error with all its problems."""
+    """MachineSpec from the contents of a fit file; one error lists all its problems."""
     record, settings = found.further.get("record"), found.further.get("fit")
     record = record if isinstance(record, RecordSettings) else RecordSettings()
     options = {} if settings is None else given(settings)

@@ -1,4 +1,4 @@
-"""Fit files: rig files in which fitted values may be missing, with tables on records, fit and population."""
+"""Fit files: rig files in which fitted values may be missing, with further tables on records, fit and population."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ class Spec(Displayed):
         Labels of laws to compare; empty unless the file lists some.
     undecided : tuple of str
         Labels of laws to compare if the normal stress changes in a record and the file names no memory of normal
-        stress: all memories, with the slip and the aging law each unless the file names an evolution law.
+        stress: every memory, with the evolution law that the file names, or else with both slip and aging law.
     windows : bool
         True if every step of a record is fitted as a separate record.
     v_ref_given : bool
-        True if the file gives the velocity at which mu_ref holds; otherwise it is that at the start of the first
-        record.
+        True if the file gives the velocity at which mu_ref holds; otherwise it is the velocity at the start of the
+        first record.
     contact_given : bool
         True if the file has a table ``[contact]`` with a value.
     population : PopulationSettings or None
@@ -82,7 +82,7 @@ class Spec(Displayed):
     population: PopulationSettings | None = None
 
     def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> Record:
-        """Record of an experiment, read with the settings of the file."""
+        """Record of an experiment, read from a file with the settings of the fit file."""
         options = self.record.arguments()
         decimate = options.pop("decimate", None)
         options["skip_bad_lines"] = skip_bad_lines or options.get("skip_bad_lines", False)
@@ -97,7 +97,7 @@ class Spec(Displayed):
         return found
 
     def compared(self, records: Sequence[Record]) -> tuple[str, ...]:
-        """Labels of the laws to compare: those of the file, or else `undecided` if the normal stress changes."""
+        """Labels of the laws to compare: `laws` or, if it is empty and the normal stress changes, `undecided`."""
         imposed = self.rig.contact.is_imposed() or self.rig.contact.has_pores()
         decides = imposed and any(record.stress_changes for record in records)
         return self.laws or (self.undecided if decides else ())
@@ -110,7 +110,7 @@ class Spec(Displayed):
         return compare_laws(rig, parts, self.compared(records), **options)
 
     def _options(self, rig: Slider) -> dict[str, Any]:
-        """Arguments of `fit`; the drainage rate is free too if the contact got pores because of the records."""
+        """Arguments of `fit`; if the contact was given pores because of the records, the drainage rate is free too."""
         further = [name for name in rig.of_kind("drainage") if name not in self.rig.parameters()]
         if "free" not in self.options or not further:
             return self.options
@@ -131,7 +131,7 @@ class Spec(Displayed):
         return rig, parts
 
     def referred_to(self, record: Record) -> Spec:
-        """Copy with the initial velocity of a record as reference velocity of mu_ref, unless the file gives that."""
+        """Copy whose reference velocity of mu_ref is a record's initial velocity, unless the file gives a velocity."""
         references = [name for name in self.rig.of_kind("reference rate") if name.startswith("friction.")]
         if self.v_ref_given or not references:
             return self
@@ -206,7 +206,8 @@ def _spec(found: RigFileContents, filled: _Placeholders) -> Spec:
 def _undecided(law: FrictionLaw, said: set[str]) -> tuple[str, ...]:
     """Labels of laws to compare if the normal stress changes, for a file whose table `[friction]` has the keys `said`.
 
-    The memory of normal stress cannot be found with the wrong evolution law; therefore both are compared.
+    The memory of normal stress cannot be found with the wrong evolution law; therefore both evolution laws are
+    compared.
     """
     memories, others = (
         [words for name, words in choices.items() if name not in said]
@@ -226,7 +227,7 @@ def lab_rig(
     v_ref: Any = "1 um/s",
     velocity: Any = None,
 ) -> Slider:
-    """Rig for fits, with rate-and-state friction and constant normal stress; its values are placeholders.
+    """Rig for fits, with rate-and-state friction and constant normal stress; values to be fitted are placeholders.
 
     Parameters
     ----------
@@ -236,15 +237,15 @@ def lab_rig(
     normal_memory : str
         ``none``, ``linker-dieterich`` or ``prakash-clifton``.
     pores : bool
-        True for a contact with pores: a change of the pore pressure drains into them at a rate that is fitted. If
-        false, it acts at once.
+        True for a contact with pores: a change of the pore pressure reaches them by drainage, whose rate is fitted. If
+        false, a change acts at once.
     stiffness : float or str, optional
         Stiffness of the machine, Pa/m, if it is known; name it also in ``fixed`` of `fit`.
     v_ref : float or str
         Reference velocity, at which friction is mu_ref.
     velocity : float or str, optional
-        Velocity of the load point before the first change of a protocol; by default that of the records. `fit` needs
-        it if the records have no displacement.
+        Velocity of the load point before the first change of a protocol; by default the initial velocity of the
+        records. `fit` needs it if the records have no displacement.
 
     Examples
     --------
@@ -269,7 +270,7 @@ def with_pores(rig: Slider) -> Slider:
 
 
 class _Placeholders:
-    """Completes the tables of a fit file with placeholders, and records which values were missing.
+    """Placeholders with which the tables of a fit file are completed, and names of the values that were missing.
 
     The laws declare which values may be missing, with their placeholders (`Parameter.standing`).
 
@@ -279,7 +280,7 @@ class _Placeholders:
     missing : set of str
         Names of missing parameters that are to be fitted.
     standing : dict of str to str
-        Names of missing parameters that follow from the records, by kind (`FROM_RECORDS`).
+        Names of missing parameters whose values follow from the records, by kind (`FROM_RECORDS`).
     friction : set of str
         Keys that the file has in its table ``[friction]``.
     of_machine : bool
@@ -296,7 +297,7 @@ class _Placeholders:
         self.of_machine = False
 
     def given(self, kind: str, changed: set[str]) -> bool:
-        """True if the file, or a change to it, gives the parameter of a kind that else comes from the records."""
+        """True if the file, or a change to it, gives the parameter of this kind, which records would give otherwise."""
         return kind not in self.standing or self.standing[kind] in changed
 
     def complete(self, tables: Table) -> None:
@@ -330,7 +331,7 @@ class _Placeholders:
                     self._fill(contact, item, "contact.")
 
     def _fill(self, table: Table, item: Field[Any], prefix: str, factor: float = 1.0) -> None:
-        """Add the placeholder of a missing parameter, times `factor`, to its table, if it declares one."""
+        """Add the declared placeholder of a parameter, times `factor`, to its table if its value is missing."""
         role = role_of(item)
         if item.name in table or not isinstance(role, Parameter) or role.standing is None:
             return
@@ -341,7 +342,7 @@ class _Placeholders:
             self.missing.add(f"{prefix}{item.name}")
 
     def _fill_law(self, table: Table, law: type[FrozenRecord], prefix: str, states: Any = None) -> None:
-        """Add placeholders for the parameters of a law, of its parts, and of the states in a list."""
+        """Add placeholders for the missing parameters of a law, of its parts, and of the states in its lists."""
         items = {item.name: item for item in fields(law)}  # type: ignore[arg-type]  # every law is a dataclass
         roles = {name: role for name, item in items.items() if isinstance(role := role_of(item), Part)}
         lists = [name for name, role in roles.items() if role.many]
@@ -377,7 +378,7 @@ class _Placeholders:
         return {item.name for item in items} | {key for member in members for key in member}
 
     def _fill_part(self, table: Table, name: str, role: Part, prefix: str, elsewhere: set[str]) -> None:
-        """Add placeholders for the parameters of a part of a law, in the law's table or in that of the part."""
+        """Add placeholders for the missing parameters of a part of a law, in the table of the law or of the part."""
         chosen = table.get(name)
         own = chosen.get("law") if isinstance(chosen, dict) else chosen
         law = role.family.registry.get(own) if isinstance(own, str) else None
@@ -393,13 +394,13 @@ class _Placeholders:
 
 
 def _kind(item: Field[Any]) -> str:
-    """Kind of a field's parameter, see `steadyslip.core.roles.PARAMETER_KINDS`; empty for other fields."""
+    """Kind (see `steadyslip.core.roles.PARAMETER_KINDS`) of a field that is a parameter; empty for other fields."""
     role = role_of(item)
     return role.kind if isinstance(role, Parameter) else ""
 
 
 def _values_missing(missing: set[str], settings: FitSettings, rig: Slider | Machine) -> list[Problem]:
-    """Problems with parameters that have no value and are not fitted: their placeholders must not be used."""
+    """Problems with parameters that have no value and are not fitted, for which placeholders must not be used."""
 
     problems: list[Problem] = []
 
@@ -417,7 +418,7 @@ def _values_missing(missing: set[str], settings: FitSettings, rig: Slider | Mach
     absent = missing & named("fixed")
     if settings.free is not None:
         absent |= missing - named("free") - set(rig.of_kind("friction level"))
-    if problems:  # a misspelt name is not a missing one
+    if problems:  # names may be misspelt, so do not report missing values
         return problems
     message = "has no value and is not fitted; give it one, or name it in [fit] free"
     return [Problem(name, message) for name in sorted(absent)]

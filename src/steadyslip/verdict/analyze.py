@@ -176,7 +176,7 @@ def _judged(rig: Any, branch: int, kicks: Sequence[str]) -> Analysis:
 
 
 def _explained(found: Analysis, states: Sequence[Any]) -> Analysis:
-    """`found` with its reason and warnings filled in; `states` are all steady states of the rig."""
+    """Copy of `found` with reason and warnings filled in; `states` are all steady states of the rig."""
     if found.rig.in_forces:
         return replace(found, reason=machine.reason(found), warnings=tuple(machine.warnings(found, states)))
     edged = (ON_THE_EDGE,) if found.on_edge else ()
@@ -227,7 +227,7 @@ def _onset(rig: Slider | Machine, distances: Sequence[Margin], branch: int) -> O
     edges = [one for one in margin.edges if one.kind == "oscillatory" and one.stable != "neither"] if margin else []
     if margin is None or not edges:
         return None
-    with suppress(NotAvailable):  # raised for rigs with a delay
+    with suppress(NotAvailable):  # NotAvailable is raised for rigs with a delay
         return onset_at(rig, edges_about(margin.value, edges)[0], branch)
     return None
 
@@ -237,7 +237,7 @@ def _kicks(rig: Slider | Machine, kinds: Sequence[str], branch: int) -> tuple[Th
     if not kinds:
         return ()
     from steadyslip.nonlinear.kicks.kicks import kick_problems
-    from steadyslip.nonlinear.kicks.several_kicks import thresholds_shown  # compiles; only where asked for
+    from steadyslip.nonlinear.kicks.several_kicks import thresholds_shown  # compiles code: only if needed
 
     asked = [(kick.strip(), at.strip() or None) for kick, _, at in (words.partition(" at ") for words in kinds)]
     if problems := [one for kick, at in asked for one in kick_problems(rig, kick, at)]:

@@ -23,19 +23,19 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 
-MOST_EXACT = 12  # up to this many differences every subset is judged (4096 rigs); beyond, random orders are sampled
-MOST_RIGS = 1024  # most mixed rigs built one by one (some ms each), needed where laws or zeros differ
+MOST_EXACT = 12  # up to this many differences every subset is judged (4096 rigs); for more, random orders are sampled
+MOST_RIGS = 1024  # limit of mixed rigs that are built one by one (some ms each), where laws or zeros differ
 IMPOSSIBLE = "not possible"
-ORDERS = 256  # random orders of the differences, each also reversed: sampling error of a share is some percent
+ORDERS = 256  # number of random orders of the differences, each also reversed: shares have errors of some percent
 
 Place = tuple[Differing, ...]
 """Differences that are exchanged together: one, or two keys that exclude each other (stiffness, axial_stiffness)."""
 
 
 def comparable(first: Slider | Machine, second: Slider | Machine) -> tuple[Slider | Machine, Slider | Machine]:
-    """Both rigs expressed per unit area, or both as totals of the contact, so that their areas enter no equation.
+    """Copies of both rigs in a common form, per unit area or as totals of the contact, without areas in equations.
 
-    If their areas differ, whichever of the two forms leaves fewer differing values.
+    If their areas differ, the form in which fewer values differ is taken.
     """
     if first.area == second.area:
         return first, second
@@ -56,7 +56,7 @@ def places(first: Slider | Machine, second: Slider | Machine) -> tuple[Place, ..
     """Differences between two comparable rigs that enter their equations, grouped as `Place`."""
     idle = {*first.not_in_model, *second.not_in_model}
     found: list[Place] = []
-    exchanged: dict[str, list[Differing]] = {}  # by table: keys that only one of the rigs has
+    exchanged: dict[str, list[Differing]] = {}  # by table: the keys that only one of the rigs has
     for one in differing(first, second):
         if one.name in idle:
             continue
@@ -84,7 +84,7 @@ class Outcomes:
 
 @dataclass(frozen=True)
 class Between:
-    """Mixed rigs: some of the differing values from a first rig, the others from a second.
+    """Mixed rigs, which have some of the differing values from a first rig and the others from a second rig.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Between:
                 rig = mixed(self.first, self.second, taken)
                 self._judge(rig, masks[rows], built, rows, found)
             except (ParameterError, NotAvailable):
-                continue  # this mixture is no valid rig: it stays `IMPOSSIBLE`
+                continue  # this mixture is not a valid rig: its verdict stays `IMPOSSIBLE`
         return found
 
     def _judge(self, rig: Slider | Machine, masks: Array, built: Array, rows: Array, found: Outcomes) -> None:
@@ -140,7 +140,7 @@ class Between:
 def shapley(between: Between, measure: str = "") -> tuple[str, Array]:
     """Shapley value of every place: its contribution to the change of a measure from the first rig to the second.
 
-    It is the mean change of the measure when that place is exchanged, over all orders in which places can be exchanged
+    It is the mean change of the measure when the place is exchanged, over all orders in which places can be exchanged
     (L. S. Shapley, A value for n-person games, 1953); with more than `MOST_EXACT` places over random orders (J. Castro,
     D. Gómez and J. Tejada, Computers & Operations Research 36, 2009). The values add up to the whole change.
 

@@ -33,7 +33,7 @@ def _response(analysis: Findings) -> Response | None:
 
 @quietly
 def why_always_stable(analysis: Findings) -> str:
-    """Clause that explains stability at every stiffness; empty where no single condition explains it."""
+    """Clause that explains why the rig is stable at every stiffness; empty if no single condition explains it."""
     known = _response(analysis)
     if known is None or known.B3 != 0:
         return ""
@@ -52,7 +52,7 @@ def _has_damping(analysis: Findings) -> bool:
 
 @quietly
 def why_never_stable(analysis: Findings) -> str:
-    """Clause that names the stability condition no stiffness meets; empty where no single condition explains it."""
+    """Clause that names the stability condition that no stiffness meets; empty if no single condition explains it."""
     known = _response(analysis)
     if known is None:
         return _why_none_in_general(analysis)
@@ -61,7 +61,7 @@ def why_never_stable(analysis: Findings) -> str:
     _, _, a2, _ = coefficients(**numbers, k=k)
     if a2 <= 0:
         return ": friction and normal stress together feed every motion, whatever the stiffness (a2 > 0 fails)"
-    gain = float(analysis.rig.drive.proportional())  # acts as a spring: the least total stiffness
+    gain = float(analysis.rig.drive.proportional())  # the gain acts as a spring: the least total stiffness
     if not _reachable(1 + known.mu * known.B2, -known.mu * known.B3, gain):
         return ": a disturbance grows without oscillating (static stability, a0 > 0, fails at every stiffness)"
     numerator, denominator = hopf_line(**numbers)
@@ -132,11 +132,11 @@ NEEDS_MASS = (
 )
 """Reason given where steady sliding is not judged without mass; {names} are dotted parameter names."""
 
-_SMALL = np.array([1e-3, 1e-6, 1e-9])  # masses relative to their natural sizes, as samples of ever smaller ones
+_SMALL = np.array([1e-3, 1e-6, 1e-9])  # ever smaller masses that are tried, relative to their natural sizes
 
 
 def why_delay_is_ill_posed(point: OperatingPoint) -> str:
-    """Sentence that names the delays that make the rig of a scalar `point` ill-posed; empty where none does."""
+    """Sentence that names the delays that make the rig at `point` (scalars) ill-posed; empty if none does."""
     if late_on_springs(point):
         return LATE_ON_SPRINGS
     delays = outweighing_delays(point)
@@ -145,10 +145,11 @@ def why_delay_is_ill_posed(point: OperatingPoint) -> str:
 
 @quietly
 def undecided_without_mass(rig: Rig, branch: int = 0) -> str:
-    """Reason not to judge an ill-posed rig without delay that any small mass, in place of a zero one, makes stable.
+    """Reason not to judge an ill-posed rig without delay that becomes stable if zero masses are replaced by small ones.
 
     An example is bristles without damping whose friction rises with velocity: without mass nothing slows a change of
-    velocity; a small mass on them oscillates and decays at a rate that does not depend on the mass. Empty for others.
+    velocity; a small mass on them oscillates and decays at a rate that does not depend on the mass. The text is empty
+    for other rigs.
     """
     massless = [
         name for name, one in rig.parameters().items()

@@ -20,9 +20,9 @@ from steadyslip.verdict.spreads import GROUPS, Spreads, spreads_of
 from steadyslip.verdict.tolerances import LOG2_CLOSED, LOG2_OTHERS, chance_of, log2_of
 
 K = TypeVar("K")
-PLACES = 5  # values tried per interval, ends included, of one or two unknown parameters; of more only the ends
-AT_ONCE = 2**20  # rigs evaluated in one array operation; bounds memory
-LOG2_FEW, LOG2_FEWEST = 7, 4  # log2 of rigs per group in searches over one and two parameters
+PLACES = 5  # number of values tried in each interval (ends included) for one or two unknown parameters; else the ends
+AT_ONCE = 2**20  # limit of rigs that are evaluated in one array operation; bounds memory
+LOG2_FEW, LOG2_FEWEST = 7, 4  # log2 of the number of rigs per group, in searches over one and over two parameters
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Chances:
         return float(self.rig.parameters()[name].value or 0.0)
 
     def allowed(self, name: str, values: Array) -> Array:
-        """Mask (m,) of values (m,) of a parameter that the rig can have and whose tolerance stays inside its domain."""
+        """Mask (m,) of the values (m,) of a parameter that are allowed and whose tolerance stays inside the domain."""
         domain = self.rig.parameters()[name].role.domain
         spread = None if self.spreads is None else self.spreads.of.get(name)
         good = np.asarray(domain.contains(values), dtype=bool)
@@ -72,7 +72,7 @@ class Chances:
         return self._chances(changes, self.sizes[1])
 
     def fewest(self, changes: Mapping[str, Array]) -> Array:
-        """Chances (m,) as by `few`, each from some hundred sampled rigs."""
+        """Chances (m,) of the rig with changed values (m,) by name, each from some hundred sampled rigs."""
         return self._chances(changes, self.sizes[2])
 
     def whole(self, changes: Mapping[str, float]) -> tuple[float, float]:
@@ -99,14 +99,14 @@ class Chances:
         return np.asarray(np.min(found, axis=0))
 
     def _corners_hold(self, changes: Mapping[str, Array]) -> NDArray[np.bool_]:
-        """True (m,) where every possible corner of the ranges is stable, or corners do not count."""
+        """True (m,) where every possible corner of the tolerance ranges is stable, or if corners do not count."""
         if self.spreads is None or not self.certain:
             return np.ones(max((len(values) for values in changes.values()), default=1), dtype=bool)
         stable, possible = self._of_shares(changes, self.spreads.corner_shares())
         return np.asarray(np.all(stable | ~possible, axis=1))
 
     def _judged(self, changes: Mapping[str, Array], log2: int) -> tuple[Array, Array]:
-        """Masks (m, n): stable, and possible, for n sampled rigs about each of the m changed values."""
+        """Two masks (m, n) over n sampled rigs about each of m changed values: the stable and the possible ones."""
         return self._of_shares(changes, None if self.spreads is None else self.spreads.shares(log2))
 
     def _of_shares(self, changes: Mapping[str, Array], shares: Mapping[str, Array] | None) -> tuple[Array, Array]:

@@ -56,22 +56,25 @@ polynomial moves a double root by 1e-8; growth at the least of `SIDE_OFFSETS` is
 NEUTRAL = 4
 """Status of undamped rigs without a growing root; added to those of `steadyslip.linear.status`."""
 
-_TERMS = 3_000_000  # most terms evaluated on the imaginary axis to count roots of rigs with delays: one to two seconds
+_TERMS = 3_000_000  # limit of terms evaluated on the imaginary axis to count roots of rigs with delays: 1 to 2 s
 _DECIDING = ("steady sliding", "growing roots")  # checks that must pass for a verdict
-_STEP = 1e-3  # change of ln velocity, ln stress and ln memory used to find the typical size of a memory rate
+_STEP = 1e-3  # change of ln(velocity), ln(stress) and ln(memory) from which the typical size of a memory rate is found
 _ROUNDING = 8 * float(np.finfo(float).eps)  # relative rounding error of velocity and memory after a few operations
-_ZERO = 1e-9  # size of a root relative to the largest below which it counts as zero (rounding)
+_ZERO = 1e-9  # a root counts as zero (rounding) if its size is less than this share of the largest
 
 
 def verdict_checks(
     rig: Rig, point: OperatingPoint, stable: bool, on_edge: bool, steady: SteadyMachine | None = None
 ) -> tuple[Check, ...]:
-    """Checks of steady sliding, eigenvalues and number of growing ones; `steady`: a machine's reported forces."""
+    """Checks of steady sliding, of eigenvalues and of the number of growing eigenvalues.
+
+    `steady` are the forces that the verdict on a machine reports.
+    """
     return (steady_check(rig, point, steady), *spectrum_checks(point, stable, on_edge))
 
 
 def undecided(checks: Sequence[Check]) -> str:
-    """Text that names the failed checks among those a verdict needs; empty where these passed."""
+    """Text that names the failed checks among those that a verdict needs; empty if all of these passed."""
     failed = [str(one) for one in checks if not one.passed and one.what in _DECIDING]
     return UNDECIDED + "; ".join(failed) if failed else ""
 
@@ -168,7 +171,7 @@ def relative_errors(point: OperatingPoint) -> tuple[Array, NDArray[np.bool_]]:
     zero = np.where(size <= found.errors, _ZERO * np.max(size, initial=0.0), 0.0)
     with np.errstate(all="ignore"):
         share = found.errors / np.maximum(size, zero)
-        if is_neutral(point):  # the static stiffness is 0: the zero root is exact
+        if is_neutral(point):  # the static stiffness is 0, so the root 0 is exact
             share[size <= _ZERO * np.max(size, initial=0.0)] = 0.0
     return share, (share <= GOOD) | np.full(share.shape, found.decided)
 
@@ -205,7 +208,7 @@ def critical_check(point: OperatingPoint, stiffness: float, beta: float) -> Chec
 
 
 def missing_edges(names: Sequence[str], why: str) -> Iterator[Check]:
-    """One failed check that names the parameters whose edges were not searched for; nothing if `names` is empty."""
+    """Yield one failed check that names the parameters whose edges were not searched for; none if there are none."""
     if names:
         how = f"{why}; steadyslip.boundary(rig, name) looks for one alone"
         yield Check(f"edges of {', '.join(names)}", how, np.inf, 0.0, False)
@@ -260,7 +263,7 @@ def _find_sides(
     branch: int,
     among: NDArray[np.bool_] | bool = True,
 ) -> None:
-    """Fill `shares` (n,) where inf: the first of `offsets` at which stability on both sides agrees with the edge."""
+    """Replace infinite `shares` (n,) by the first of `offsets` at which both sides agree with the edge."""
     for share in offsets:
         rest = np.flatnonzero(np.isinf(shares) & among).tolist()
         if rest:
@@ -283,7 +286,7 @@ def _room(edges: Sequence[tuple[Margin, Boundary]]) -> Array:
 
 
 def _sizes(edges: Sequence[tuple[Margin, Boundary]]) -> Array:
-    """Scale of the parameter at each edge, (n,): |edge|; if that is 0 the rig's own value, or the largest searched."""
+    """Scale (n,) of the parameter at each edge: |edge|; if that is 0, the rig's own value or the largest searched."""
     return np.array([abs(edge.value) or abs(margin.value) or margin.searched[1] for margin, edge in edges])
 
 

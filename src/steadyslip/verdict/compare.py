@@ -97,7 +97,7 @@ class RigComparison(Displayed):
             yield "stable in", first, second
 
     def _unknown(self) -> Iterator[tuple[str, str, str]]:
-        """Rows (label, first rig, second rig) on unknown parameters: each by itself, then all at once."""
+        """Rows (label, first rig, second rig) on unknown parameters: each varied alone, then all at once."""
         of = [{} if one is None else {each.parameter: each.told for each in one.each} for one in self.unknown]
         for name in {**of[0], **of[1]}:
             yield name, of[0].get(name, "known"), of[1].get(name, "known")
@@ -132,7 +132,7 @@ class RigComparison(Displayed):
         yield from self.decisive()
 
     def _alike(self) -> str:
-        """Sentence for two rigs that do not differ in equations and numbers."""
+        """Sentence on two rigs whose equations and numbers do not differ."""
         first, second = self.within
         same = ["equations", "numbers", *(["intervals of what is not known"] if any(self.unknown) else [])]
         if apart := differing_tolerances(first, second):
@@ -142,7 +142,7 @@ class RigComparison(Displayed):
 
     @property
     def of(self) -> str:
-        """`measure` in words; empty if there are no parts."""
+        """Text for the quantity in `measure`; empty if the differences have no parts."""
         return {"safety": "k/k_cr", "growth": "the growth rate"}.get(self.measure, "")
 
     def part_in_words(self, one: Difference) -> str:
@@ -150,7 +150,7 @@ class RigComparison(Displayed):
         return one.told(self.measure)
 
     def decisive(self) -> Iterator[str]:
-        """Sentences on the differences each of which alone changes the verdict."""
+        """Sentences on those differences that would change the verdict by themselves."""
         first, second = self.alike
         for name, word, unknown in zip(self.names, self.alike, self.unknown, strict=True):
             if word == PARTLY and unknown is not None:
@@ -293,14 +293,17 @@ def _check_slides(rigs: Iterable[Slider | Machine], names: Iterable[str]) -> Non
         "drive.velocity is 0, but verdicts on sliding are compared; give it a speed, such as '1 mm/min', without keys "
         "for holding a position, or use `steadyslip hunt`, ss.hunt(rig) in Python, for each rig"
     )
-    held = dict.fromkeys(name for rig, name in zip(rigs, names, strict=True) if rig.holds)  # each file once
+    held = dict.fromkeys(name for rig, name in zip(rigs, names, strict=True) if rig.holds)  # each name once
     problems = [Problem(name, message) for name in held]
     if problems:
         raise ParameterError(problems)
 
 
 def _factor(one: Findings) -> float | None:
-    """k/k_cr of a slider, a parallel controller gain added to both; None for machines or without critical stiffness."""
+    """Ratio k/k_cr of a slider, with the gain of a parallel controller added to both stiffnesses.
+
+    None for machines and for sliders without a critical stiffness.
+    """
     if one.rig.in_forces or one.steady is None:
         return None
     support = support_stiffness(one)
@@ -319,7 +322,7 @@ def _growth(one: Findings) -> str:
 
 
 def _oscillation(one: Findings) -> complex | None:
-    """Eigenvalue (1/s) of the leading mode, whose growth rate is reported; None if it does not oscillate."""
+    """Eigenvalue (1/s) of the leading mode, whose growth rate is reported; None if the mode does not oscillate."""
     leading = one.eigenvalues[0] if one.eigenvalues else None
     return leading if leading is not None and leading.imag else None
 

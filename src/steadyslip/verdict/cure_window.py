@@ -9,7 +9,7 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.written import WrittenAs, displayed_as
 from steadyslip.linear.nearness import doublings, ends_about
 
-LEAST = 1e-12  # smallest over largest value searched, of a parameter whose own value is 0
+LEAST = 1e-12  # ratio of the smallest to the largest value searched, for a parameter whose own value is 0
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,9 @@ class Window(Displayed):
         return f"{first.removesuffix(f' {name}') if name else first} to {last}"
 
     def written(self, value: float, beside: float | None = None) -> str:
-        """Format a value in the unit of the rig's own, with enough digits to differ from it, or from `beside`."""
+        """Text of a value in the unit of the rig's own value, with enough digits to differ from it or from `beside`."""
         if 0 == self.limits[0] < value < LEAST * self.limits[1]:
-            return "anything above 0"  # the edge is 0 itself, as for the damping of a machine that nothing damps yet
+            return "anything above 0"  # the edge is at 0, as for the damping of a machine that nothing damps
         factor, unit = self.told or (1.0, self.unit)
         with displayed_as(self.written_as):
             digits = digits_apart(value, self.value if beside is None else beside)

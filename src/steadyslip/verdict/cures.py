@@ -31,13 +31,13 @@ from steadyslip.verdict.tolerances import GIVEN, format_chance
 from steadyslip.verdict.unknown import ValuesWithin, stable_within
 
 DECADES = 3.0  # decades searched to each side of a value without limits
-SCANNED, COARSE = 97, 17  # values along one parameter, along each of a pair: by trial, time against missed windows
-FROM_ZERO = 145  # values tried of a parameter that is 0, over the twelve decades that `boundary` searches
-BESIDE = 1e-6  # relative distance from an edge of the rig itself at which the chance is evaluated too
-HALVINGS, FEW_HALVINGS = 52, 12  # halvings of a bracket: to the last digit for one rig, to 1e-5 for a sample of rigs
+SCANNED, COARSE = 97, 17  # numbers of values tried along one parameter, and along each of two parameters: by trial
+FROM_ZERO = 145  # number of values tried of a parameter that is 0, over the twelve decades that `boundary` searches
+BESIDE = 1e-6  # the chance is evaluated at this relative distance from the rig's own edges, too
+HALVINGS, FEW_HALVINGS = 52, 12  # bisections of an edge: to the last digit for one rig, to 1e-5 for a sample of rigs
 NEAR = np.linspace(-0.02, 0.02, 5)  # relative distances from an edge at which the whole sample is evaluated
-FAR = math.log2(REMOTE)  # doublings beyond which a loss of stability is not reported
-PAIRS = 3  # cheapest pairs of the coarse search that are refined
+FAR = math.log2(REMOTE)  # a loss of stability is not reported if it needs more doublings of a parameter than this
+PAIRS = 3  # number of the cheapest pairs of the coarse search that are refined
 PRELOAD = "normal stress"  # role kind of the parameters that press a contact, whatever their name in a law
 DESIGN = (
     ("stiffness", "axial_stiffness", "kp", "kv"), ("damping", "kd", "ki", "tn"), ("mass", "inertia"), (PRELOAD,),
@@ -101,7 +101,7 @@ class Cures(ReadOnly):
 
     @property
     def best(self) -> Window | None:
-        """The cheapest single change; None if none reaches the chance, or none is needed."""
+        """Window of the cheapest single change; None if no change reaches the chance, or none is needed."""
         found = [one for one in self.windows if one.nearest is not None]
         return min(found, key=lambda one: one.cost, default=None)
 
@@ -152,7 +152,7 @@ class Cures(ReadOnly):
         return lines
 
     def _now(self) -> str:
-        """Chance or verdict of the rig as it is, as text; with unknown parameters the least."""
+        """Text of the chance or verdict for the rig as it is; with unknown parameters, of the least chance."""
         if self.error:
             return format_chance(self.chance, self.error) + (" where least" if self.unknown else "")
         own = stability(self.rig)
@@ -296,7 +296,7 @@ def _limits(chances: Chances, name: str, one: Adjustment) -> tuple[float, float]
 
 
 def _scan(chances: Chances, name: str, limits: tuple[float, float]) -> Array:
-    """Values of a parameter to try, rising: that of the rig, evenly spread ones within the limits, and near edges."""
+    """Rising values of a parameter to be tried: the rig's own, evenly spread ones, and some close to edges."""
     low, high = limits
     own = chances.own(name)
     if low * high > 0:
@@ -330,7 +330,7 @@ def _windows(chances: Chances, name: str, one: Adjustment, sure: float) -> Windo
         return np.asarray(chances.few({name: at}) >= sure)
 
     inside = reached(values)
-    sharp = chances.single or chances.certain  # no sampling error: edges are sharp
+    sharp = chances.single or chances.certain  # without sampling errors, edges are sharp
     at = np.flatnonzero(inside[1:] != inside[:-1])
     edges = _narrowed(reached, values[at], values[at + 1], inside[at], HALVINGS if sharp else FEW_HALVINGS)
     edges = edges if sharp else np.array([_settled(chances, name, edge, sure) for edge in edges])
@@ -353,7 +353,7 @@ def _unit_cost(name: str, one: Adjustment) -> float:
 
 
 def _beyond(chances: Chances, name: str, limits: tuple[float, float]) -> tuple[str, float] | None:
-    """Nearest edge outside the limits beyond which the rig itself is stable: its stable side and value; else None."""
+    """Nearest edge outside the limits beyond which the rig is stable: stable side and value; None without one."""
     try:
         edges = boundary(chances.rig, name)
     except (NotAvailable, ParameterError):
@@ -365,7 +365,10 @@ def _beyond(chances: Chances, name: str, limits: tuple[float, float]) -> tuple[s
 
 
 def _narrowed(reached: Callable[[Array], Array], low: Array, high: Array, first: Array, halvings: int) -> Array:
-    """Bisect brackets `low`, `high` (n,) of edges: the last values that reach the chance; `first` where `low` does."""
+    """Bisect brackets `low`, `high` (n,) of edges; returns the last values (n,) at which the chance is reached.
+
+    `first` is True where the chance is reached at `low`.
+    """
     if not low.size:
         return low
     low, high = low.copy(), high.copy()
@@ -378,7 +381,7 @@ def _narrowed(reached: Callable[[Array], Array], low: Array, high: Array, first:
 
 
 def _settled(chances: Chances, name: str, edge: float, sure: float, others: Mapping[str, float] | None = None) -> float:
-    """Edge refined with the whole sample, by interpolating chances near it; `edge` if these do not bracket `sure`.
+    """Edge refined by interpolation of chances near it, from the whole sample; `edge` if they do not enclose `sure`.
 
     `others` are changed values of other parameters.
     """
@@ -431,7 +434,7 @@ def _cost(chances: Chances, adjust: Mapping[str, Adjustment], name: str, to: Arr
 def _coarse(
     chances: Chances, first: Window, second: Window, adjust: Mapping[str, Adjustment], sure: float, least: float
 ) -> Iterator[tuple[float, str, str, float, float]]:
-    """Cheapest change of two parameters on a coarse grid: cost, both names, both values; nothing if none is enough."""
+    """Yield the cheapest sufficient change of two parameters on a coarse grid: cost, names, values; or nothing."""
     grids = []
     for one in (first, second):
         low, high = one.limits
@@ -464,7 +467,7 @@ def _refined(
     values = np.geomspace(own, to[0], COARSE) if own * to[0] > 0 else np.linspace(own, to[0], COARSE)
     values = values[chances.allowed(one, values)]
     low = np.full(values.size, own_two)
-    step = math.sqrt(to[1] / own_two) if own_two * to[1] > 0 else 1.0  # margin: `to` was enough for a small sample only
+    step = math.sqrt(to[1] / own_two) if own_two * to[1] > 0 else 1.0  # a margin: `to` was found with a small sample
     high = np.full(values.size, min(max(to[1] * step, limits[0]), limits[1]))
 
     def reached(at: Array) -> Array:

@@ -53,7 +53,7 @@ class Findings(Displayed):
     undamped : bool
         True if nothing damps a machine, not even friction: no disturbance dies out, and edges are where one grows.
     margins : tuple of Margin
-        Distance of each parameter to its nearest edge, the most critical first.
+        Distance of each parameter to the nearest edge of stability, the most critical parameter first.
     onset : Onset or None
         Kind of onset at the nearest oscillatory edge: of a slider in stiffness, of a machine in any parameter.
     kicks : tuple of Threshold

@@ -31,20 +31,20 @@ from steadyslip.motion.sentence import (
 from steadyslip.motion.status import BLOWN_UP, LOST
 from steadyslip.protocol import VelocityStep
 
-STEP = 1.1  # factor on the drive's speed while it disturbs: small, yet above rounding of steady sliding
-PERIODS = 12  # length of the first run in periods of the leading disturbance, so that its growth is seen
-BEGIN, END = 0.05, 0.1  # fractions of the first run between which the drive is faster
+STEP = 1.1  # factor on the drive's speed during the disturbance: small, yet well above rounding errors
+PERIODS = 12  # length of the first run, in periods of the leading mode, so that its growth is seen
+BEGIN, END = 0.05, 0.1  # the drive is faster between these fractions of the first run
 LONGER = 4.0  # ratio of the lengths of successive runs
-MOST_STEPS = 300_000  # integration steps of a run: some tenths of a second
-MOST_TERMS = 300  # most entries of structures' matrices for which code compiles within some seconds
-FEWEST = 8  # fewest events in the second half of a run needed to conclude that their slips have no trend
-TURNS = 0.25  # least fraction, by trial, of irregular events at which slips turn from growing to shrinking or back
+MOST_STEPS = 300_000  # limit of integration steps of a run: some tenths of a second
+MOST_TERMS = 300  # limit of entries in the matrices of structures: more take longer than some seconds to compile
+FEWEST = 8  # least number of events in the second half of a run to conclude that their slips have no trend
+TURNS = 0.25  # least share of events, by trial, after which slips change from growing to shrinking or back
 ENDINGS = {LOST: ", until contact is lost after {time}", BLOWN_UP: ", until it runs away after {time}"}
 """Clause on the end of a motion, by `History.status`; {time} is counted from the disturbance."""
 
 
 def _first(eigenvalues: Sequence[complex]) -> float:
-    """Length of the first run, s; NaN if no eigenvalue sets a time scale."""
+    """Length (s) of the first run; NaN if no eigenvalue gives a time scale."""
     leading = next((s for s in eigenvalues if s.imag > 0), next(iter(eigenvalues), None))
     if leading is None or not 0 < abs(leading) < math.inf:
         return math.nan
@@ -54,7 +54,7 @@ def _first(eigenvalues: Sequence[complex]) -> float:
 def motion_after(
     rig: Slider | Machine, eigenvalues: Sequence[complex], branch: int = 0, repeated: bool = False
 ) -> History | None:
-    """Motion of a rig whose drive is 10 % faster for a short while; None if no eigenvalue sets a time scale.
+    """Motion of a rig whose drive is 10 % faster for a short time; None if no eigenvalue gives a time scale.
 
     With `repeated` the run is lengthened until its slip events or oscillations repeat, or `MOST_STEPS` is near.
 
@@ -80,7 +80,7 @@ def motion_after(
 
 
 def repeats(run: History) -> bool:
-    """True if, for each contact that slips, all forward events in the last half of the run are alike to `ALIKE`.
+    """True if, at each contact that slips, all forward events in the last half of the run agree within `ALIKE`.
 
     Comparing only two successive events would also accept an oscillation that still grows slowly; within the last half
     of the run it grows by more than `ALIKE`.
@@ -119,7 +119,7 @@ def grown(run: History) -> str:
 def is_irregular(run: History) -> bool:
     """True if each contact that slips goes on slipping in the last half of the run, by amounts without a trend.
 
-    No trend means: slips become larger and smaller by turns, and are no larger in the last quarter than in the third.
+    There is no trend if slips grow and shrink in turn, and are no larger in the last quarter than in the third.
     """
     end = float(run["t"][-1])
     late = [one for one in run.slip_events if one.slip > 0 and one.begin > 0.5 * end]
@@ -136,7 +136,7 @@ def is_irregular(run: History) -> bool:
 
 
 def judder_sentence(rig: Slider | Machine, eigenvalues: Sequence[complex], branch: int = 0) -> str:
-    """Sentence on the motion of an unstable rig after a small disturbance; empty where that is not known.
+    """Sentence on the motion of an unstable rig after a small disturbance; empty if the motion is not known.
 
     It describes slip events that repeat or vary without a trend, a lasting oscillation, or how the motion ends.
     """

@@ -40,7 +40,7 @@ def stability_rows(analysis: Findings) -> list[tuple[str, str]]:
 
 
 def _pull(machine: Machine, name: str) -> list[tuple[str, str]]:
-    """Row (label, text) naming the links whose pull T sets a contact's normal force; none where there is one link."""
+    """Row (label, text) that names the links whose pull T sets a contact's normal force; none if it is one link."""
     surface = machine.contacts[name]
     at = [link for link, one in machine.links.items() if surface.held in one.between and "x" in one.directions()]
     controlled = machine.drive.driven() == surface.held
@@ -50,7 +50,7 @@ def _pull(machine: Machine, name: str) -> list[tuple[str, str]]:
 
 
 def meaning(analysis: Findings) -> list[str]:
-    """Lines on the limits of the verdict "stable", or on the motion of an unstable machine; only if decided."""
+    """Lines on the limits of the verdict "stable", or on the motion of an unstable machine; none if undecided."""
     if not analysis.stable:
         return [] if analysis.growth_rate == math.inf or has_response(analysis.rig) else [instead(analysis)]
     return [MEANS]
@@ -79,7 +79,7 @@ def reason(found: Findings) -> str:
     if found.on_edge:
         return PHRASES["undamped"] + hint if found.undamped else PHRASES["on edge"]
     if not found.stable:
-        counted = not found.eigenvalues and found.unstable_roots  # an even count means oscillating pairs
+        counted = not found.eigenvalues and found.unstable_roots  # an even number means oscillating pairs
         swings = counted % 2 == 0 if counted else any(s.imag for s in found.eigenvalues[:1])
         return PHRASES["oscillatory" if swings else "divergence"] + hint
     return PHRASES["dies out"] + hint

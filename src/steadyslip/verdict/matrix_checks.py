@@ -29,7 +29,7 @@ from steadyslip.model.numeric.pencil import linearised
 from steadyslip.verdict.checks import BALANCE_TOLERANCE, SIDE_OFFSETS, missing_edges
 from steadyslip.verdict.numbers import rates_of
 
-_CHECKED = 8  # rightmost eigenvalues checked: each takes a matrix decomposition
+_CHECKED = 8  # number of rightmost eigenvalues that are checked; each check takes a matrix decomposition
 
 
 def matrix_numbers(point: MachinePoint) -> dict[str, Any]:

@@ -16,9 +16,9 @@ from steadyslip.machine.machine import Machine
 from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
 from steadyslip.verdict.numbers import rates_of
 
-_REPORTED = 1e-4  # relative width of an edge's bracket (or of a growth rate) above which it is reported
-_EDGES = 3  # nearest edges that are computed from the identified modes as well
-_SURE = 4.0  # standard errors within which two computations agree
+_REPORTED = 1e-4  # the error of an edge or growth rate is reported if its relative size is larger than this
+_EDGES = 3  # number of nearest edges that are computed from the identified modes, too
+_SURE = 4.0  # two computations agree if they differ by fewer standard errors than this
 _UNLIKE = (
     " (more than errors away from the turns: modes near the ends of the band cannot be distinguished from those beyond)"
 )
@@ -44,7 +44,7 @@ def growing_root(machine: Machine) -> tuple[complex | None, float]:
 
 
 def doubt_of_growth(machine: Machine) -> str:
-    """Reason why a pair counted as growing may decay nevertheless; empty if it surely grows or no pair was counted."""
+    """Reason why a pair counted as growing may in fact decay; empty if it certainly grows, or if none was counted."""
     root, error = growing_root(machine) if measured_machine(machine).count.growing == 2 else (None, 0.0)
     if root is None or error < root.real:
         return ""
@@ -55,7 +55,7 @@ def doubt_of_growth(machine: Machine) -> str:
 
 
 def response_numbers(found: MeasuredMachine) -> dict[str, Any]:
-    """Fields of `Analysis` by name from a count of growing roots; with the eigenvalue where one pair grows."""
+    """Fields of `Analysis` by name from a count of growing roots; with the eigenvalue if a single pair grows."""
     growing = found.count.growing
     root = growing_root(found.machine)[0] if growing == 2 else None
     if not found.contacts.posed:

@@ -18,8 +18,8 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasipolynomial, require_range
 from steadyslip.verdict.checks import relative_errors
 
-_BESIDE_AXIS = 1e-12  # |real part| over modulus that counts as rounding: a pair that leaves the axis has 1e-8 at least
-_TERMS = 4_000_000  # most terms evaluated on the imaginary axis for a rig with delays: two to four seconds
+_BESIDE_AXIS = 1e-12  # |real part| over modulus below which it is rounding: a pair off the axis has at least 1e-8
+_TERMS = 4_000_000  # limit of terms evaluated on the imaginary axis for a rig with delays: two to four seconds
 
 
 def _without_delay(values: OperatingPoint) -> dict[str, Any]:
@@ -53,7 +53,7 @@ def _with_delays(values: OperatingPoint) -> dict[str, Any]:
 
 
 def linear_numbers(values: OperatingPoint) -> dict[str, Any]:
-    """Fields of `Analysis` by name, from the characteristic equation; without eigenvalues that fail their check.
+    """Fields of `Analysis` by name, from the characteristic equation; eigenvalues that fail their check are left out.
 
     Raises
     ------
@@ -83,13 +83,13 @@ def _numbers(values: OperatingPoint) -> dict[str, Any]:
         numbers["eigenvalues"] = _on_the_axis(numbers["eigenvalues"])
         rate = max((s.real for s in numbers["eigenvalues"]), default=rate)
     eigenvalues = numbers["eigenvalues"]
-    if eigenvalues and eigenvalues[-1].imag > 0:  # the list was cut between two of a pair
+    if eigenvalues and eigenvalues[-1].imag > 0:  # the list was cut between the two members of a pair
         eigenvalues = numbers["eigenvalues"] = (*eigenvalues, eigenvalues[-1].conjugate())
     return numbers | rates_of(eigenvalues, rate)
 
 
 def _on_the_axis(eigenvalues: tuple[complex, ...]) -> tuple[complex, ...]:
-    """Eigenvalues of an undamped machine with real parts that are rounding set to 0; the slowest first."""
+    """Eigenvalues of an undamped machine, the slowest first; real parts that are only rounding are set to 0."""
     found = (s if abs(s.real) > _BESIDE_AXIS * abs(s) else complex(0.0, s.imag) for s in eigenvalues)
     return tuple(sorted(found, key=lambda s: (-s.real, abs(s.imag), -s.imag)))
 

@@ -57,7 +57,7 @@ def reason(analysis: Findings) -> str:
     if analysis.on_edge and own == 0 and 0 in analysis.eigenvalues:
         return REASONS["free"]
     ratio = math.nan if support.critical is None else own / (support.critical + support.beside)
-    if analysis.on_edge and not abs(ratio - 1) <= NEXT_TO_IT:  # on the edge of another parameter
+    if analysis.on_edge and not abs(ratio - 1) <= NEXT_TO_IT:  # the rig is on the edge of another parameter
         return ON_EDGE
     if support.critical is None:
         if not support.stable and analysis.stable:
@@ -87,7 +87,7 @@ def page_reasons(rig: Slider) -> dict[str, str]:
 
 
 def _many(ratio: float) -> str:
-    """Format a ratio with 3 to 8 digits, enough to show that it differs from one."""
+    """Text of a ratio with 3 to 8 digits, enough to show that it differs from 1."""
     apart = np.floor(np.log10(abs(ratio - 1) or 1.0))
     return format_quantity(ratio, "1", int(np.clip(1 - apart, 3, 8)))
 

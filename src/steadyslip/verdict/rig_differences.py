@@ -94,7 +94,7 @@ def differences_of(pairs: Pairs) -> tuple[str, tuple[Difference, ...]]:
 def _sorted(
     pairs: Pairs, between: Between, named: Mapping[str, Place], values: Array, alone: Sequence[Any], measure: str
 ) -> tuple[Difference, ...]:
-    """Differences, largest part first, from Shapley values (pairs, differences) and the verdicts with each alone."""
+    """Differences, largest part first, from Shapley values (pairs, differences) and verdicts with each alone."""
     mean = values.mean(axis=0)
     size = float(np.sum(np.abs(mean)))
     found = []
@@ -138,7 +138,7 @@ def _within(rig: Slider | Machine, name: str, ends: tuple[float, float]) -> str:
 
 
 def _text(rig: Slider | Machine, name: str, value: Any, named: bool) -> str:
-    """Format a value with its unit, and with its key if `named`; None becomes the parameter's default, or empty."""
+    """Text of a value with its unit, and with its key if `named`; None gives the parameter's default, or nothing."""
     known = rig.parameters().get(name)
     if value is None:
         return "" if named or known is None else known.role.unless_given

@@ -36,7 +36,7 @@ HOW_LARGE = "The size of such a kick does not follow from the kind of onset; ste
 """Second line of text on those limits, if the verdict has a kind of onset but no thresholds of kicks."""
 AT_EDGE = {"at the edge": "oscillation with period {period}", "along the axis": "critical stiffness {critical}"}
 """Text of rows on the critical stiffness, by label; browser pages use the same."""
-MOST_WINDOWS = 4  # stable intervals of stiffness listed in the text; chosen by trial, length against completeness
+MOST_WINDOWS = 4  # largest number of stable stiffness intervals that the text lists; by trial
 
 
 def numbers_of(rig: Slider, point: OperatingPoint) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def stiffness_numbers(rig: Slider, point: OperatingPoint) -> dict[str, Any]:
     """Fields of `Analysis` by name on stiffness: stable intervals (Pa/m) and the edge nearest to the rig's own."""
     try:
         found = set_of_one(point)
-    except NotAvailable:  # with a delay there may be infinitely many stable windows
+    except NotAvailable:  # with a delay there may be infinitely many stable intervals
         return {}
     own = float(point.named()["slider.stiffness"])
     intervals = found.intervals[np.all(np.isfinite(found.intervals[:, :1]), axis=-1)]
@@ -98,7 +98,7 @@ def stability_rows(analysis: Findings) -> list[tuple[str, str]]:
 
 
 def _stress(analysis: Findings, value: float) -> str:
-    """Format a stress; with a contact area as force and stress, the kind that the rig's file uses first."""
+    """Text of a stress; with a contact area, of force and stress, where the one used in the rig's file comes first."""
     area = analysis.rig.area
     stress = format_quantity(value, "Pa")
     if area is None:
@@ -108,7 +108,7 @@ def _stress(analysis: Findings, value: float) -> str:
 
 
 def _pull(rig: Slider) -> list[tuple[str, str]]:
-    """Row (label, text) naming what the pull T includes; none if T is the spring's force or sets no normal force."""
+    """Row (label, text) on the parts of the pull T; none if T is the spring's force alone or sets no normal force."""
     control = [rig.drive.proportional(), rig.drive.dashpot(), rig.drive.integral()]
     inside = {"spring": rig.stiffness or rig.axial_stiffness, "damper": rig.damping, "controller": any(control)}
     pulling = [f"the {name}" for name, there in inside.items() if there]
@@ -130,7 +130,7 @@ def _stable_set(analysis: Findings) -> str:
             parts.append(f"{support.words} below {in_stiffness(analysis, high)}")
         else:
             parts.append(f"{support.words} from {in_stiffness(analysis, low)} to {in_stiffness(analysis, high)}")
-    if len(parts) > MOST_WINDOWS:  # list those around the rig's own stiffness, or the lowest
+    if len(parts) > MOST_WINDOWS:  # list the intervals around the rig's own stiffness, or the lowest
         at = next((i for i, (low, high) in enumerate(support.stable) if low < support.own < high), 0)
         first = max(0, min(at - MOST_WINDOWS // 2, len(parts) - MOST_WINDOWS))
         more = f"{len(parts) - MOST_WINDOWS} windows more, see stable_stiffness"

@@ -24,8 +24,8 @@ from steadyslip.machine.slider import Slider
 
 GROUPS = 16
 """Independent groups of sampled rigs, whose scatter gives the error of a share: 16 groups give it to a fifth."""
-MOST_ALL_CORNERS = 12  # up to this many parameters every corner is tried (4096); beyond, 4096 random ones
-_EDGE = 1e-15  # smallest probability used: keeps normal quantiles finite
+MOST_ALL_CORNERS = 12  # up to this many parameters all corners (4096) are tried, for more 4096 random corners
+_EDGE = 1e-15  # smallest probability that is used, which keeps normal quantiles finite
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Spreads:
         return {name: even[..., i] for i, name in enumerate(self.of)}
 
     def corners(self) -> dict[str, Array]:
-        """Values by parameter at the corners of the ranges, each (corners,); normally distributed ones are nominal."""
+        """Values by parameter at the corners of the ranges, each (corners,); normally distributed ones stay nominal."""
         shares = self.corner_shares()
         return {
             name: np.full(len(shares[name]), one.value) if one.normal else one.quantile(shares[name])
@@ -136,9 +136,10 @@ class Spreads:
         return {name: high[:, bounded.index(name)] if name in bounded else np.full(len(high), 0.5) for name in self.of}
 
     def shapes(self) -> dict[str, tuple[float, ...]]:
-        """By parameter: both ends over the value, and 1 if normal, else 0; by pair of parameters: the correlation.
+        """Numbers that describe the distributions, equal for totals of a contact and for stresses.
 
-        They are equal for totals of a contact and for stresses; where the value is 0 the ends are not divided.
+        For a parameter: both ends over the nominal value (if that is not 0), and 1 if normal, else 0. For a pair of
+        parameters: the correlation.
         """
         found: dict[str, tuple[float, ...]] = {
             name: (one.low / (one.value or 1.0), one.high / (one.value or 1.0), float(one.normal))

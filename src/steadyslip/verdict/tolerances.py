@@ -33,13 +33,13 @@ from steadyslip.verdict.words import format_parameter, format_parameter_range
 
 # Sizes of samples, chosen by trial: computing time against the error of shares and the resolution of ranges (1/64).
 LOG2_CLOSED, LOG2_OTHERS, LOG2_LATE = 12, 8, 4  # log2 of rigs per group: with closed form, others, with a delay
-VALUES_ALONE = 65  # values of a parameter that is varied alone, both ends included
-VALUES_SEARCHED = 17  # values tried of each parameter in turn in `_otherwise`
-REACHES = (1.0, 0.1, 0.01, 0.001)  # fractions of the range searched in successive rounds of `_otherwise`
-BINS = 32  # bins of equally many rigs: variance between them is attributed to the parameter
-LEAST = 0.01  # share of the variance below which a parameter is not worth naming
-ALIKE = 1e-12  # difference of relative deviations that counts as rounding of a conversion of units
-STUDENT = 2.131  # quantile for 95 % of Student's distribution with GROUPS - 1 degrees of freedom
+VALUES_ALONE = 65  # number of values of a parameter that is varied alone, both ends included
+VALUES_SEARCHED = 17  # number of values of each parameter that `_otherwise` tries in turn
+REACHES = (1.0, 0.1, 0.01, 0.001)  # shares of the range that `_otherwise` searches in successive rounds
+BINS = 32  # number of bins with equally many rigs; the variance between bins is attributed to the parameter
+LEAST = 0.01  # a parameter with a smaller share of the variance is not named
+ALIKE = 1e-12  # a smaller difference of relative deviations is rounding in a conversion of units
+STUDENT = 2.131  # two-sided 95 % quantile of Student's distribution with GROUPS - 1 degrees of freedom
 GIVEN = Tested(
     "names and their tolerances, or what read_tolerances gives", lambda v: isinstance(v, (Mapping, Tolerances))
 )
@@ -331,7 +331,7 @@ def _otherwise(
 
     Corners of the ranges are tried first, then values around the drawn rig, or corner, that is closest to the edge.
     """
-    sign = 1.0 if every.stable[0] else -1.0  # search for a growth rate of the other sign
+    sign = 1.0 if every.stable[0] else -1.0  # a growth rate of the other sign is searched for
 
     def judged(rigs: Mapping[str, Array]) -> tuple[Array, Array]:
         mask = np.broadcast_to(spreads.possible(rigs), next(iter(rigs.values())).shape)
@@ -385,7 +385,7 @@ def log2_of(rig: Slider | Machine) -> int:
 
 
 def _finite_range(values: Array) -> tuple[float, float] | None:
-    """Least and largest of the finite values; None where there is none."""
+    """Least and largest finite value; None if no value is finite."""
     finite = values[np.isfinite(values)]
     return (float(finite.min()), float(finite.max())) if len(finite) else None
 

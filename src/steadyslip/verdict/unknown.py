@@ -24,9 +24,9 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 from steadyslip.verdict.chances import spread_over
 
-VALUES = 129  # values tried of each interval; a window narrower than 1 % of it may be missed
-HALVINGS = 40  # bisections of a spacing around each change: far below the digits printed
-LOG2_RIGS = 10  # log2 of rigs with all unknown parameters varied at once: shares to a few percent
+VALUES = 129  # number of values tried in each interval; a window narrower than 1 % of the interval may be missed
+HALVINGS = 40  # number of bisections between two tried values with different verdicts: far below the printed digits
+LOG2_RIGS = 10  # log2 of the number of rigs with all unknown parameters varied at once: shares to a few percent
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class ValuesWithin(Displayed):
     """Notation of the parameter in the rig's file, kept in printed values."""
 
     def shown(self, value: float) -> str:
-        """Format a value with its unit; a value per load also as that of the contact."""
+        """Text of a value with its unit; a value per load is also given as the value of the contact."""
         with displayed_as(self.written_as):
             text = format_quantity(value, self.unit)
         if self.load is None or self.unit not in PER_LOAD or " at " in text:
@@ -64,7 +64,7 @@ class ValuesWithin(Displayed):
 
     @property
     def given(self) -> str:
-        """The interval as text."""
+        """Text of the interval in which the parameter is known to lie."""
         return f"{self.shown(self.low)} to {self.shown(self.high)}"
 
     def __str__(self) -> str:
@@ -72,7 +72,7 @@ class ValuesWithin(Displayed):
 
     @property
     def told(self) -> str:
-        """Text on the stable values in the interval."""
+        """Text on those values in the interval at which sliding is stable."""
         given = self.given
         if not self.values:
             return f"stable nowhere in {given}"

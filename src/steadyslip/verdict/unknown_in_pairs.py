@@ -14,7 +14,7 @@ from steadyslip.verdict.chances import values_tried
 
 Rig = Slider | Machine
 Intervals = Mapping[str, tuple[float, float]]
-ALIKE = 1e-12  # relative difference of interval ends that counts as rounding of a conversion of units
+ALIKE = 1e-12  # a smaller relative difference of interval ends is rounding in a conversion of units
 BOTH, FIRST, SECOND = "both", "first", "second"
 
 
@@ -43,7 +43,7 @@ class Pairs:
         return tuple(name for name in {**self.of_first, **self.of_second} if name not in self.shared)
 
     def stability(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Verdicts on the first rig, and on the second, at the values tried."""
+        """Verdicts on the first rig, and verdicts on the second rig, at the values tried."""
         first, second = (tuple(str(stability(one)) for one in rigs) for rigs in zip(*self.tried, strict=True))
         return first, second
 

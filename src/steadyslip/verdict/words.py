@@ -134,7 +134,8 @@ def is_undecided(analysis: Findings) -> bool:
 def stable_speeds(analysis: Findings) -> list[tuple[str, str]]:
     """Row (label, text) on all drive velocities at which sliding is stable.
 
-    No row if they were not searched, nor for a rig in stresses whose stability does not depend on them.
+    There is no row if these velocities were not searched for, nor for a rig in stresses whose stability does not
+    depend on velocity.
     """
     rig, margin = analysis.rig, next((one for one in analysis.margins if one.parameter == "drive.velocity"), None)
     if margin is None:
@@ -225,7 +226,7 @@ def disturbance(analysis: Findings) -> str:
         text = PACE["grows"].format(time=format_quantity(analysis.time_to_double, "s"))
     elif analysis.time_to_halve is not None:
         text = PACE["decays"].format(time=format_quantity(analysis.time_to_halve, "s"))
-    else:  # only the sign of the leading root is above rounding
+    else:  # only the sign of the leading root is certain; its value is within rounding
         return f"{'dies away' if analysis.stable else 'grows'} too slowly for a rate to be distinguished from rounding"
     if not analysis.eigenvalues:
         return f"{text} at the slowest, infinitely many oscillations nearly alike"

@@ -25,6 +25,9 @@ _NEAR = 1e-13  # length of a piece over its frequency below which it is not cut 
 class _Pieces:
     """Pieces of the imaginary axis.
 
+    Arrays are the index of the rig (pieces,) and, for both ends of each piece, the frequency (2, pieces), the terms
+    without their factors e^(−sh), (2, m, pieces), and their sum with these factors (2, pieces).
+
     Arrays are the index of the rig (pieces,) and, at both ends of a piece, the frequency (2, pieces), the terms without
     their factors e^(−sh), (2, m, pieces), and their sum with these factors (2, pieces).
     """
@@ -48,10 +51,11 @@ class SumsOnAxis:
 
     `sets` (m, d) is True where a delay acts in a term; the highest power must not be able to vanish (`neutral`).
 
-    The axis is cut until the change of argument on each piece is known. Either one term is larger than all others
-    together: the argument of the sum then follows that of the term, with less than π/2 of difference at either end,
-    whatever the delays. Or the sum cannot wind around zero on the piece: its path is at most as long as the piece times
-    the largest slope; if that is less than the sum of the sizes at both ends, path and chord pass zero on one side.
+    The axis is cut until the change of argument on each piece is known. Either one term is larger than all other terms
+    together: the argument of the sum then follows the argument of that term, with a difference of less than π/2 at
+    either end, whatever the delays. Or the sum cannot wind around zero on the piece: its path is at most as long as the
+    piece times the largest slope; if that is less than the sum of the sizes at both ends, path and chord pass zero on
+    one side.
     """
 
     c: Array
@@ -144,8 +148,8 @@ def count_by_argument(c: Array, h: Array, sets: Sets) -> NDArray[np.int64]:
     """Number of roots right of the axis of sums c (rows, m, n+1) with delays h (rows, m), combined as in `sets`.
 
     `UNKNOWN` where counting takes too long. By the argument principle the number is n/2 minus the change of argument
-    along the positive imaginary axis over π. Beyond the bound of frequencies the argument differs by less than π/2 from
-    that of the highest power, which for Re s to infinity becomes that of its term without delay.
+    along the positive imaginary axis over π. Above the bound of frequencies the argument of the sum differs by less
+    than π/2 from that of the highest power of s, which for Re s to infinity becomes that of the term without delay.
     """
     coefficients, top = highest(c)
     end = bound_on_axis(c, sets)

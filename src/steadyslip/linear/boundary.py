@@ -226,7 +226,7 @@ def margins_and_missing(rig: Rig, branch: int = 0) -> tuple[tuple[Margin, ...], 
     """Result of `margins`, and the names of the parameters whose edges took too long to find.
 
     If edges are known in a part of the range only, that part is `searched` of the margin; the parameter is also listed
-    as missing, with the other part in words, if its nearest edge may lie there.
+    as missing, with the rest of the range in words, if its nearest edge may lie there.
     """
     if not by_matrices(rig):
         _require_answers(rig, branch)

@@ -30,7 +30,7 @@ def gaps(u: ComplexArray) -> Array:
 
 
 def near_couplings(grid: Array, gaps_at: Callable[[Array], Array]) -> Array:
-    """Parameter values between samples at which two squares of roots come closest: a narrow window may lie there."""
+    """Parameter values between samples at which two squared roots come closest; a narrow window may be near."""
     gap = gaps_at(grid)
     dips = np.flatnonzero((gap[1:-1] <= gap[:-2]) & (gap[1:-1] <= gap[2:]) & np.isfinite(gap[1:-1])) + 1
     low, high, found = grid[dips - 1], grid[dips + 1], [np.empty(0)]
@@ -51,7 +51,7 @@ def meeting(u: ComplexArray) -> tuple[str, float]:
 
 
 class UndampedSearch(Search):
-    """Scan of one parameter of a rig that is undamped at all its values."""
+    """Scan of one parameter of a rig that is undamped whatever the value of the parameter."""
 
     def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
         with np.errstate(all="ignore"):
@@ -92,7 +92,10 @@ class UndampedSearch(Search):
 
 
 def search_for(rig: Rig, name: str, present: tuple[str, ...], branch: int) -> Search:
-    """Scan of one parameter for edges of stability, or of growth where a machine is undamped at all its values."""
+    """Scan of one parameter for edges of stability.
+
+    Of growth if the machine is undamped at all values of the parameter.
+    """
     found = Search(rig, name, present, branch)
     with np.errstate(all="ignore"):
         if not np.all(is_undamped(found.own)):

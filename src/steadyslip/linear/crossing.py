@@ -33,9 +33,9 @@ def routh(c: Polynomial) -> list[Any]:
 
 
 def is_ill_posed(c: Polynomial, spare: Any) -> Any:
-    """True where the highest coefficient of a polynomial that is not 0 is negative, or more than `spare` are 0.
+    """True where the first coefficient from the top that is not 0 is negative, or lies below more than `spare` zeros.
 
-    `spare` is the number of highest coefficients that may be 0, such as that of a mass of 0; see
+    `spare` is the number of highest coefficients that may be 0 because, for example, a mass is 0; see
     `model.posed.spare_powers`.
     """
     found: Any = (c[-1] < 0) | ((c[-1] <= 0) & (spare < 1))
@@ -87,9 +87,9 @@ def stiffness_on_axis(p: Polynomial, q: Polynomial, square: Any) -> Any:
 
 
 def real_edges(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> tuple[Any, Any]:
-    """k at which a root of p + k q is zero, and k at which the highest coefficient vanishes (a root is infinite).
+    """Value of k at which a root of p + k q is zero, and value at which the highest coefficient is zero.
 
-    The highest coefficient is that of the highest power present in p or q.
+    The highest coefficient belongs to the highest power of s in p or q; where it is zero, a root is infinite.
     """
     top = -p[0] / q[0]
     for one, other in zip(p[1:], q[1:], strict=True):

@@ -101,12 +101,12 @@ def _set_of_cells(edges: Array, frequencies: Array, stable: NDArray[np.bool_]) -
 
 @quietly
 def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, sets: Sets, spare: int) -> StableSet | None:
-    """Stable set of θ in P + θ Q between `low` and `high`; the rig's own value is θ = 1.
+    """Stable set of θ in P + θ Q between `low` and `high`, where θ = 1 is the parameter's value in the rig.
 
     P and Q are (m, n+1), with delays h (m,), combined as in `sets` (m, d); the `spare` highest powers may be missing.
     The set is known within `searched`, which ends before values with infinitely many windows, whatever the range. An
-    interval that begins at `low` itself is extended to zero, one that ends at `high` itself to infinity. None where the
-    delay is so long for the rig's own value that windows are too many.
+    interval that begins at `low` is extended to zero, an interval that ends at `high` to infinity. None if the delay is
+    so long that there are too many windows already near θ = 1.
     """
     theta = 10 ** (np.arange(np.floor(_STEPS * np.log10(low)), np.ceil(_STEPS * np.log10(high)) + 1) / _STEPS)
     low, high = float(theta[0]), float(theta[-1])
@@ -139,7 +139,7 @@ def _ill_posed(p: Array, q: Array, sets: Sets, spare: int, theta: Array) -> NDAr
 
 
 def _edges_of_ill_posed(p: Array, q: Array, sets: Sets, spare: int, theta: Array) -> Array:
-    """Values within the range of `theta` at which the equations become ill-posed; those from `corners` are exact."""
+    """Values within the range of `theta` at which the equations become ill-posed; values from `corners` are exact."""
     top = int(np.flatnonzero(np.any((p != 0) | (q != 0), axis=0))[-1])
     tops = -(p[:, top] @ corners(sets)) / (q[:, top] @ corners(sets))
     tops = np.unique(tops[(tops > theta[0]) & (tops < theta[-1])])
@@ -217,10 +217,11 @@ def _count_each(
 def _count_by_crossings(
     p: Array, q: Array, h: Array, sets: Sets, theta: Array, beta: Array, probes: Array
 ) -> NDArray[np.int64]:
-    """Number of roots right of the axis at every probe θ, from few counts and the directions of the crossings between.
+    """Number of roots right of the axis at every probe θ, from counts at a few probes and from crossings between these.
 
-    A root crosses the axis at (theta, i beta) with ds/dθ = −Q/(P' + θ Q'). Where it may run along the axis instead,
-    roots are counted on both sides. If the crossings between two counts do not add up, every probe there is counted.
+    A root crosses the axis at (theta, i beta) with ds/dθ = −Q/(P' + θ Q'). Where the root may run along the axis,
+    roots are counted on both sides. If the crossings between two counts do not explain their difference, roots are
+    counted at every probe between them.
     """
     s = 1j * np.where(np.isinf(beta), np.nan, beta)
     speed = -value(q, h, s) / (slope(p, h, s) + theta * slope(q, h, s))
@@ -246,7 +247,7 @@ def _frequency_bound(p: Array, q: Array, sets: Sets, theta: Array) -> Array:
 
 
 def _largest_between(p: Array, q: Array, sets: Sets, theta: Array) -> float:
-    """Upper bound of frequencies of roots on the axis between the first and the last θ, over intervals with a bound.
+    """Upper bound of frequencies of roots on the axis between the first and the last θ, where a bound exists.
 
     Between two samples, a pair of frequencies may appear at which terms are equal in size, far above those at the
     samples. The change of θ Q within an interval therefore counts as one more term of arbitrary phase per part of Q.
@@ -276,8 +277,9 @@ def _bound_of_terms(c: Array, sets: Sets) -> Array:
 def _last_crossing(c: Array) -> Array:
     """Frequency (rows,) above which the term without delay exceeds all others together, for c (rows, m, n+1).
 
-    For the highest power it must be larger (`leads`). Cauchy and Schwarz: (Σ|p_j|)² <= Σ w_j Σ|p_j|²/w_j, exact for two
-    terms; with the highest coefficients as w_j nearly exact at high frequency.
+    It must exceed them in the highest power (`leads`). By the inequality of Cauchy and Schwarz
+    (Σ|p_j|)² <= Σ w_j Σ|p_j|²/w_j, exact for two terms, and nearly exact at high frequency with the highest
+    coefficients as w_j.
     """
     sizes = np.abs(highest(c)[0])
     weights = sizes[:, 1:] + _SPARE * (sizes[:, :1] - np.sum(sizes[:, 1:], axis=-1, keepdims=True))

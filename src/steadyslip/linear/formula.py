@@ -151,9 +151,9 @@ def _answers(model: Model) -> dict[str, sp.Expr]:
 
 
 def formula_in_parts(rig: Slider | Machine, along: str | None = None) -> list[sp.Eq]:
-    """Result of `formula` as one equation if short, else in quantities of `small_signal`, with an equation for each.
+    """Result of `formula` as one equation if short, else with an equation for each letter in it.
 
-    Formulas of other parameters than a slider's stiffness are one equation.
+    Letters stand for quantities of `small_signal`; only the formula of a slider's stiffness is parted.
 
     Raises
     ------

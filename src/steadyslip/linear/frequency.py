@@ -25,7 +25,10 @@ def transfer(rig: Slider | Machine, input: str, output: str, periods: Array) -> 
 
 
 class _TransferFunction:
-    """G(iω) = C(iω − A)⁻¹B + D of `steadyslip.state_space`; with delays, for which there is none, by `receptance`."""
+    """Transfer function G(iω) = C(iω − A)⁻¹B + D of `steadyslip.state_space`.
+
+    With delays there are no such matrices, and `receptance` is used.
+    """
 
     def __init__(self, rig: Slider | Machine, input: str, output: str) -> None:
         self.point, self.names = operating_point(rig), ((output,), (input,))

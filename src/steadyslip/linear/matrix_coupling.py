@@ -25,7 +25,7 @@ _RISE = 1e-12  # squared root over the largest, up to which it counts as the zer
 
 
 class UndampedMatrixSearch(MatrixSearch):
-    """Search of one parameter of a machine that is undamped at all its values."""
+    """Search of one parameter of a machine that is undamped whatever the value of the parameter."""
 
     def boundaries(self, between: tuple[float, float] | None = None) -> tuple[Boundary, ...]:
         with np.errstate(all="ignore"):
@@ -47,7 +47,7 @@ class UndampedMatrixSearch(MatrixSearch):
         )
 
     def _meeting(self, low: float, high: float, below: int, above: int) -> Boundary:
-        """Edge between two values: there two squared roots meet, one passes zero, or steady sliding ends."""
+        """Edge between two values, at which two squared roots meet, one passes zero, or steady sliding ends."""
         if ABSENT in (below, above):
             return self._described(self._end(low, high), 0.0, below, above)
         low, high = self._narrowed(low, high, lambda values: np.asarray(self.statuses(values) != below), 0.0)

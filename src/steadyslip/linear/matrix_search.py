@@ -142,7 +142,8 @@ class MatrixSearch:
 
     @cached_property
     def _probes(self) -> tuple[list[float], list[StatePencil]]:
-        """Steps from the parameter's own value to `_PROBES` inside its domain, and the pencils there."""
+        """Steps that lead from the parameter's value in the machine to `_PROBES`, inside its domain, and the pencils
+        there."""
         size = abs(self.value) or self._sizes[0]
         values = [self.value + size * (f - 1) if self.value == 0 else self.value * f for f in _PROBES]
         if np.isfinite(self.role.domain.high):  # angles and shares
@@ -371,7 +372,10 @@ def _between(low: float, high: float) -> float:
 
 
 def _distinct(values: Array, omega: Array) -> tuple[Array, Array]:
-    """The rising values with their frequencies, without values that differ from the one before by rounding only."""
+    """The rising values with their frequencies.
+
+    Values that differ from the value before only by rounding are left out.
+    """
     keep = np.diff(values, prepend=-np.inf) > 1e-12 * np.abs(values)
     return values[keep], omega[keep]
 

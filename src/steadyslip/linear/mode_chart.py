@@ -232,7 +232,7 @@ def _range(rig: Machine, name: str, between: Sequence[Any] | None) -> tuple[floa
 
 
 def followed(roots_at: Callable[[Array], ComplexArray], values: Array) -> tuple[Array, ComplexArray]:
-    """Oscillations followed along a parameter: values (p,), with some added, and eigenvalues (p, n), NaN if absent.
+    """Oscillations along a parameter: its values (p,), with more added, and eigenvalues (p, n), NaN if absent.
 
     Eigenvalues at neighbouring values are matched, and eigenvalues at their midpoint check the match. Where the check
     fails, or an eigenvalue moves too far, further values are added, up to `MOST_POINTS`. Matches that remain ambiguous
@@ -271,7 +271,7 @@ def _oscillations(roots: ComplexArray) -> ComplexArray:
 
 
 def _pairs(before: ComplexArray, after: ComplexArray) -> tuple[Array, Array]:
-    """Indices, in two sets of eigenvalues, of those that match: the assignment with the least sum of distances."""
+    """Indices of matching eigenvalues in two sets: the assignment with the least sum of distances."""
     from scipy.optimize import linear_sum_assignment  # slow to import
 
     rows, columns = linear_sum_assignment(np.abs(before[:, None] - after))

@@ -45,7 +45,7 @@ def leads(c: Array) -> NDArray[np.bool_]:
 
 @quietly
 def least_size(c: Array, sets: Sets) -> Array:
-    """Lower bound (rows,) of |P| for all |x_i| <= 1, with coefficients c (rows, m) of P; 0 or less if P vanishes.
+    """Lower bound (rows,) of |P| for all |x_i| <= 1, with coefficients c (rows, m) of P; not positive if P may vanish.
 
     It is exact for two terms. If delayed terms exceed the undelayed one and some are products, |P| is minimised in one
     x_i after the other, from many starts: P is linear in each, P = A + B x_i, so that it vanishes if |B| >= |A|
@@ -108,9 +108,9 @@ def can_vanish(c: Array, sets: Sets) -> NDArray[np.bool_]:
 
 @quietly
 def bound_on_axis(c: Array, sets: Sets) -> Array:
-    """Upper bound (rows,) of |s| of roots on the axis and right of it (Fujiwara), for coefficients c (rows, m, n+1).
+    """Upper bound (rows,) of |s| for roots on the axis or right of it (Fujiwara), for coefficients c (rows, m, n+1).
 
-    NaN where there is none: the highest power can vanish.
+    NaN where no bound exists, because the highest power can vanish.
     """
     coefficients, top = highest(c)
     left = least_size(coefficients, sets)
@@ -123,7 +123,7 @@ def bound_on_axis(c: Array, sets: Sets) -> Array:
 
 
 def argument_at(c: Array, h: Array, sets: Sets, omega: Array) -> tuple[ComplexArray, Array]:
-    """P at x_i = exp(−iω τ_i), and its argument minus that of P(0) (rad), followed from x = 0; (rows,) each.
+    """P at x_i = exp(−iω τ_i), (rows,), and the change of its argument (rad) along the path from x = 0, (rows,).
 
     For coefficients c (rows, m) of P, which must not vanish for |x_i| <= 1, delays h (rows, m) of its terms and ω
     (rows,). Where terms are products, the argument may be larger than π.

@@ -48,8 +48,8 @@ class CheckedSpectrum:
     Attributes
     ----------
     values : ndarray (n,) of complex
-        1/s, by falling real part, without those that do not exist; with delays the rightmost. Empty without steady
-        sliding and where the numbers leave the range of floating point.
+        Eigenvalues in 1/s, by falling real part; with delays only the rightmost. Empty without steady sliding and where
+        the numbers leave the range of floating point.
     errors : ndarray (n,)
         Bounds of the errors (1/s), rounding of the machine's parameters in their last digit included. A double
         eigenvalue has an error of about its size times 1e-8, a triple one of 1e-5. inf where nothing is known.

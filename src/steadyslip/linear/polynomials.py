@@ -85,9 +85,11 @@ def _in_own_time(c: Array) -> Array:
 
 @quietly
 def routh_column(c: Array) -> Array:
-    """First column of the Routh array of polynomials of full degree; all positive means stable.
+    """First column of the Routh array of polynomials of full degree.
 
-    The entries depend on s to powers of one unit, so they have mixed units; only signs matter.
+    A polynomial is stable if all entries are positive.
+
+    The entries have different units; only their signs matter.
     """
     scale = np.abs(c).max(axis=-1, keepdims=True)
     column = crossing.routh(columns(c / scale))

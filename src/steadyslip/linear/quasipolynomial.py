@@ -57,7 +57,10 @@ def _terms(c: Array, h: Array) -> Iterator[tuple[Array, Array]]:
 
 @quietly
 def shifted(c: Array, h: Array, shift: Array) -> Array:
-    """Coefficients of the quasi-polynomial whose value at s is that of `c` at s + `shift`; `shift` (...)."""
+    """Coefficients of the quasi-polynomial whose value at s equals that of `c` at s + `shift`.
+
+    `shift` has shape (...).
+    """
     out = np.array(np.broadcast_to(c, np.broadcast_shapes(c.shape, (*np.shape(shift), 1, 1))), dtype=float)
     step = np.asarray(shift, dtype=float)[..., None]
     n = c.shape[-1] - 1

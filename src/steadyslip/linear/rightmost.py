@@ -52,8 +52,8 @@ def rightmost(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
     """Rightmost roots, (..., count), by falling real part.
 
     NaN where infinitely many roots lie right of the axis, or roots cannot be counted. NaN also for roots left of
-    `_line_of_many`, or too close to it to be distinguished from the infinitely many there, and from the first root on
-    that Newton's method does not find.
+    `_line_of_many`, or too close to this line to be distinguished from the infinitely many roots near it. If Newton's
+    method does not find a root, this root and all further ones are NaN.
     """
     flat = c.reshape(-1, *c.shape[-2:])
     delays = np.broadcast_to(h, (*c.shape[:-2], h.shape[-1])).reshape(-1, h.shape[-1])
@@ -225,7 +225,7 @@ def _line_of_many(c: Array, h: Array, sets: Sets) -> float:
 def rate_of_many(c: Array, h: Array, sets: Sets) -> float:
     """Real part (1/s) to which the infinitely many rightmost roots of one rig converge.
 
-    NaN if other roots lie further right, or if that is not known to a relative error of `_RATE_TOLERANCE`.
+    NaN if other roots lie further right, or if the result has a relative error of more than `_RATE_TOLERANCE`.
     """
     (scaled,), (own,), (rate,) = nondimensional(c[None], h[None])
     line, left, many = _left_end(scaled, own, sets)
@@ -234,7 +234,7 @@ def rate_of_many(c: Array, h: Array, sets: Sets) -> float:
 
 @quietly
 def nearest_to_axis(c: Array, h: Array, sets: Sets) -> complex:
-    """Root of one rig nearest to the imaginary axis (1/s), with imaginary part zero or positive."""
+    """Root (1/s) of one rig that is nearest to the imaginary axis; its imaginary part is zero or positive."""
     (scaled,), (own,), (rate,) = nondimensional(c[None], h[None])
     return complex(rate * _root_on(scaled, own, sets, 0.0))
 

@@ -60,8 +60,8 @@ def evaluate(c: Any, s: Any) -> Any:
 def roots(c: Array) -> ComplexArray:
     """All roots, (..., n) complex, sorted by falling real part; NaN where the degree is lower.
 
-    Eigenvalues of the balanced companion matrix, then Newton steps on the polynomial itself where they
-    improve it, so that slow roots keep their digits beside very fast ones. Two roots that lie close together are
+    Eigenvalues of the balanced companion matrix are improved by Newton's method on the polynomial, so that slow
+    roots keep their digits although others are very fast. Two roots that lie close together are
     found again as one quadratic factor, whose coefficients keep their digits where the roots do not: whether such a
     pair is real or complex is right unless it is double to within rounding of the polynomial, which is called real.
     """

@@ -153,7 +153,7 @@ class Search:
         return point if np.all(valid) else self.values(grid[valid])
 
     def _grid(self, between: tuple[float, float] | None) -> Array:
-        """Sample values, rising, the rig's own value among them."""
+        """Sample values in rising order, which include the parameter's value in the rig."""
         domain = self.role.domain
         if np.isfinite(domain.high):
             found = samples.bounded(domain, self.share)
@@ -207,8 +207,8 @@ class Search:
     def _found(self, between: tuple[float, float] | None) -> list[Boundary]:
         """All edges that the scan finds, rising.
 
-        Where two samples next to each other differ, the lowest change between them is narrowed. Others may hide beside
-        it, so that samples are added ever closer to it from both sides, until whatever differs has been narrowed.
+        Where the kinds of two neighbouring samples differ, the lowest change between them is narrowed. Further changes
+        may lie close to it, so samples are added ever closer to it on both sides, until all changes have been narrowed.
         """
         x, kind = self._judged(*(self._usual if between is None else self._asked(between)))
         low, high = np.empty(0), np.empty(0)
@@ -349,7 +349,7 @@ class Search:
     def _past_rounding(self, low: float, high: float) -> tuple[float, float]:
         """Bracket of an edge, widened where steady sliding ends within rounding of it.
 
-        The static stiffness vanishes there too, so that the order of the two is due to rounding only.
+        The static stiffness is zero at the end of steady sliding too, so that rounding decides which comes first.
         """
         unit = max(np.spacing(abs(low)), np.spacing(abs(high)))
         reach = _ROUNDING * unit * 8.0 ** np.arange(_WIDER)  # wide if, for example, friction hardly depends on velocity

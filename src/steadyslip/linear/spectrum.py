@@ -24,8 +24,8 @@ _ONE_CROSSING = 2  # number of roots right of the axis after a conjugate pair ha
 def spectrum(point: OperatingPoint) -> ComplexArray:
     """Eigenvalues (1/s), (..., n), by falling real part, padded with NaN; with delays only the n rightmost.
 
-    n is the number of eigenvalues of the rig with all delays zero. Where some are lost to rounding (`digits_lost`),
-    those of a single rig are computed with many digits; those of an array are NaN.
+    n is the number of eigenvalues of the rig with all delays zero. If eigenvalues are lost to rounding (`digits_lost`),
+    they are computed with many digits for a single rig, and are NaN for an array of rigs.
     """
     if not point.model.delays:
         return roots(characteristic(point)) if is_written_out(point.model) else _of_state_matrix(point)
@@ -37,7 +37,7 @@ def growth(point: OperatingPoint) -> Array:
     """Largest real part (1/s) of the eigenvalues, (...); NaN where no eigenvalue is known.
 
     With a delayed highest derivative there may be no rightmost eigenvalue: infinitely many come arbitrarily near to a
-    line, whose real part is returned then.
+    vertical line in the complex plane, whose real part is returned then.
     """
     found = (_rightmost(point, 1) if point.model.delays else spectrum(point)).real
     rate = np.max(np.where(np.isnan(found), -np.inf, found), axis=-1)
@@ -201,10 +201,10 @@ def distance_from_axis(point: OperatingPoint) -> Array:
 
 
 def _negligible(s: ComplexArray, share: float) -> Array:
-    """Size (1/s) of a real part up to which an eigenvalue (..., n) counts as one on the imaginary axis.
+    """Size (1/s) of a real part up to which an eigenvalue (..., n) counts as imaginary.
 
-    It is `share` of the eigenvalue's own size, or of the geometric mean of all if that is less: the oscillation of a
-    very stiff link may have a small damping ratio and still decay faster than all others.
+    It is `share` times the size of the eigenvalue, or times the geometric mean of all eigenvalues if that is less: the
+    oscillation of a very stiff link may have a small damping ratio and still decay faster than all other motions.
     """
     size = np.abs(s)
     some = np.isfinite(size) & (size > 0)

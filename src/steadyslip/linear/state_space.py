@@ -45,7 +45,7 @@ def state_matrices(
     Raises
     ------
     NoSteadySliding
-        If there is nothing to linearise about.
+        If steady sliding does not exist.
     UnknownNameError
         If an output or input is unknown.
     NotAvailable
@@ -142,7 +142,7 @@ def state_space(
     Raises
     ------
     NoSteadySliding
-        If there is nothing to linearise about.
+        If steady sliding does not exist.
     UnknownNameError
         If an output or input is unknown.
     NotAvailable

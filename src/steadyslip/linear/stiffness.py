@@ -260,7 +260,8 @@ def general_set(point: OperatingPoint, *, edges: bool = False) -> StableSet:
 
 
 def _size(point: OperatingPoint) -> Array:
-    """Stiffness (Pa/m) around which to search, (...): that of the spring, else a controller's gain, else 1."""
+    """Stiffness (Pa/m) around which to search, (...): that of the spring if positive, else a controller's gain, else
+    1."""
     own = np.broadcast_to(np.asarray(point.named()[STIFFNESS], dtype=float), point.shape)
     gain = np.broadcast_to(np.asarray(point.gain, dtype=float), point.shape)
     return np.where(own > 0, own, np.where(gain > 0, gain, 1.0))

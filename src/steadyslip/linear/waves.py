@@ -81,7 +81,7 @@ class Waves:
 
 
 def _enclosed(f: Waves) -> tuple[Array, Array, Array] | None:
-    """Ends of intervals in (0, 1] that have one zero each, and the sign of the slope there.
+    """Ends of intervals in (0, 1] that contain one zero each, and the sign of the slope there.
 
     None if intervals are too many.
     """

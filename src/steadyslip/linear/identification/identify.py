@@ -242,7 +242,10 @@ class _Known:
         return np.asarray((total.poles.imag > self.omega[-1]) | (-total.poles.real > _SURE * error))
 
     def covariance(self, total: ModalSum) -> Array:
-        """Covariance of the unknowns (n, n), from given errors; from residuals if larger, or if there are no errors."""
+        """Covariance of the unknowns (n, n) from the errors of the response.
+
+        It follows from the residuals if they are larger than the errors, or if no errors are given.
+        """
         rows = self.rows(total)
         sizes = np.linalg.norm(rows, axis=0)
         found = np.linalg.pinv((rows / sizes).T @ (rows / sizes), hermitian=True) / np.outer(sizes, sizes)

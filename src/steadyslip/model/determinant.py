@@ -189,8 +189,8 @@ class _Block:
 def without_cancellation(matrix: list[list[Polynomial]]) -> Polynomial | None:
     """Determinant of a small matrix, expanded in its symbols, if terms cancel in it; else None.
 
-    Terms cancel where friction depends on the rate of its own memory variable, as for bristles with damping. These
-    products of slopes may be many orders larger than the rest, so that in floating point they would not cancel.
+    Terms cancel where friction depends on the rate of its own memory variable, as for bristles with damping. The
+    terms may be many orders of magnitude larger than their sum, so that in floating point they would not cancel.
     """
     placeholders = Placeholders()
     entries = [[{powers: placeholders.polynomial(e) for powers, e in entry.items()} for entry in row] for row in matrix]

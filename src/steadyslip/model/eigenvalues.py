@@ -255,9 +255,9 @@ def eigenvalues_of(point: OperatingPoint, late: Delays = ()) -> NDArray[np.compl
 def digits_lost(point: OperatingPoint) -> NDArray[np.bool_]:
     """True for each rig where rounding of the state matrix A moves an eigenvalue by more than `MOVED` times its size.
 
-    An entry of A adds the stiffnesses of several links, so that rounding of the stiffest may hide others. To first
-    order an eigenvalue moves by |w| |A| |v| times the relative rounding of A, with left and right eigenvectors w and v,
-    w v = 1. False if the characteristic polynomial is known in symbols, or if there are delays.
+    An entry of A is a sum of the stiffnesses of several links, in which rounding of the largest may hide the others. To
+    first order an eigenvalue moves by |w| |A| |v| times the relative rounding of A, with left and right eigenvectors w
+    and v, w v = 1. False if the characteristic polynomial is known in symbols, or if there are delays.
     """
     if point.model.delays or is_written_out(point.model):
         return np.zeros(point.shape, dtype=bool)
@@ -267,7 +267,8 @@ def digits_lost(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def _polynomial(point: OperatingPoint, late: Delays) -> Array:
-    """Polynomial coefficients (..., n+1) if terms with delays `late` act without delay and others are left out."""
+    """Polynomial coefficients (..., n+1) for the terms with delays `late`, which act without delay, and those
+    without delay."""
     with np.errstate(all="ignore"):
         roots = eigenvalues_of(point, late)
         size = np.abs(roots)

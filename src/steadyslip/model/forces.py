@@ -303,7 +303,7 @@ class Forces:
 
     @cached_property
     def force(self) -> sp.Expr:
-        """Force of the drive minus that of steady sliding."""
+        """Force of the drive minus its value in steady sliding."""
         if not self.alternates:
             return sp.sympify(self.loading)
         return self.held + self.loading + (1 - self.free) * self._drive_motion_force(self.x, self.moving, INTEGRAL)
@@ -315,7 +315,7 @@ class Forces:
         return [one for one in carrying if LOAD_POINT in one.senses]
 
     def _drive_motion_force(self, displacement: Mapping[str, Any], speed: Mapping[str, Any], integral: Any) -> sp.Expr:
-        """Force of the drive caused by its motion, minus that of steady sliding, including integral action."""
+        """Force of the drive due to its motion, integral action included, minus its value in steady sliding."""
         steady, acting = (self.speeds if speed else {}), self.mechanism.integral
         pull = sp.Add(
             *(self._tension(one, displacement, speed) - self._tension(one, {}, steady) for one in self.drive_elements)
@@ -465,7 +465,8 @@ class Forces:
     def _excess_force(self, element: Element) -> sp.Expr:
         """Force in an element of a drive with imposed force, minus that of steady sliding.
 
-        Of elements in parallel (a spring and a controller), the first is assigned the imposed force.
+        If several elements are parallel (a spring and a controller), the imposed force is assigned to the first of
+        them.
         """
         if not self.alternates:
             return -self.loading / element.acts[LOAD_POINT]

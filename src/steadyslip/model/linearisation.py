@@ -61,7 +61,10 @@ class Linearisation:
 
 @cached
 def linearise(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> Linearisation:
-    """Linearise a Model at steady sliding; the intermediate stresses `kept` stay unknowns, others are eliminated."""
+    """Linearise a Model at steady sliding.
+
+    The intermediate stresses in `kept` remain unknowns, others are eliminated.
+    """
     velocities = {one.displacement: one.velocity for one in model.coordinates}
     columns: dict[sp.Symbol, None] = {}
     for item in model.variables:  # velocities of massless bodies are columns too, though they are no variables
@@ -100,8 +103,8 @@ def linearise(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> Linearisation:
 def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
     """Coefficients of the characteristic polynomial in s, lowest power first (theory 3: a0, a1, ...).
 
-    With inertia the highest is m + f1 B0 times a positive factor; it may vanish for m = 0. Terms that cancel for all
-    values of stiffnesses and inertias of several bodies have cancelled exactly.
+    With inertia the highest coefficient is m + f1 B0 times a positive factor; it may be 0 for m = 0. Terms that cancel
+    for all values of stiffnesses and inertias of several bodies have cancelled exactly.
 
     Raises
     ------

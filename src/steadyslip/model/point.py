@@ -70,7 +70,7 @@ class OperatingPoint(HasCache):
     def sigmas(self) -> tuple[Any, ...]:
         """Steady normal stress σss (Pa) of every contact over the varied parameters; NaN without steady sliding.
 
-        Of several solutions the one with index `branch` is taken.
+        If there are several solutions, the one with index `branch` is used.
         """
         return steady_stresses(self.model, self.arguments, self.branch)
 

@@ -160,7 +160,7 @@ def _of_contacts(model: Model) -> np.ndarray:
 def _dissipation_entries(model: Model) -> list[sp.Expr]:
     """Entries by rows of the damping matrix (n, n), then of the derivatives of slip rates by velocities (contacts, n).
 
-    The damping matrix is without friction, which is an unknown of its own.
+    The damping matrix does not contain friction stresses, which are separate unknowns.
     """
     linear, moving = linearise(model), [one.velocity for one in model.coordinates]
     slips = [sp.sympify(model.definitions.get(one.velocity, one.velocity)) for one in model.contacts]

@@ -122,7 +122,7 @@ def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def _finite_slopes(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where the slopes of the equations are finite, judged by polynomial coefficients or else eigenvalues."""
+    """True where the slopes of the equations are finite, by polynomial coefficients, or else by eigenvalues."""
     if not (point.model.delays or is_written_out(point.model)):
         return np.asarray(np.any(np.isfinite(eigenvalues_of(point)), axis=-1))
     c, _ = quasipolynomial(point)

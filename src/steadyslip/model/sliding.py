@@ -44,7 +44,7 @@ def steady_state(rig: Slider | Machine) -> SteadySliding | SteadyMachine:
     Returns
     -------
     SteadySliding or SteadyMachine
-        If there are several, the one with the lowest normal stress; see `steady_states`.
+        If several steady states exist, the one with the lowest normal stress; see `steady_states`.
 
     Raises
     ------

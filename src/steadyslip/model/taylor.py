@@ -70,7 +70,7 @@ class System:
 def system(model: Model) -> System:
     """Differentiate a Model three times at steady sliding.
 
-    A late value is an unknown of its own, so that equations may be nonlinear in it.
+    Delayed values are separate unknowns, so that equations may be nonlinear in them.
     """
     variables = [item.symbol for item in model.variables]
     balances = {contact.unknown: contact.balance for contact in model.contacts}

@@ -154,7 +154,7 @@ class Formulation:
         return Formulas(expressions, self.names)
 
     def _write(self) -> None:
-        """Make all formulas; constants are numbered in the order in which these use them."""
+        """Make all formulas; constants are numbered in the order in which formulas use them."""
         reduction, n = self.reduction, self.size
         seen = [[self._with_constants(one.outputs[name]) for name in OUTPUTS] for one in reduction.slidings]
         outputs = [e for one in seen for e in one]

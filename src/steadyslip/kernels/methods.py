@@ -52,7 +52,7 @@ Known = dict[Tree, np.ndarray]
 
 
 def _weights(tree: Tree, alpha: np.ndarray, beta: np.ndarray, known: Known) -> np.ndarray:
-    """Elementary weight of a tree for each stage; nodes with one branch use β (with the linear part), others α."""
+    """Elementary weight of a tree for each stage; nodes with one branch use β (with the linear part), other nodes α."""
     if tree not in known:
         through = beta if len(tree) == 1 else alpha
         product = np.ones(len(alpha))

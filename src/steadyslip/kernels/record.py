@@ -92,7 +92,7 @@ class Evaluator:
         return self.inputs(moment) | {f"y{i}": y for i, y in enumerate(self.state())}
 
     def evaluated(self, formulas: Formulas, point: Values, found: bool = False) -> list[Value]:
-        """Values of formulas at a point; unless `found`, the unknowns are solved there first."""
+        """Values of formulas at a point; the unknowns are solved for at this point first, unless `found`."""
         given = self.constants | point
         if self.z and not found:
             self.z = solved(self.kernel, given, self.z, self.scales)

@@ -71,9 +71,10 @@ class Step(Evaluator):
     def _log_growth(self) -> Node:
         """ln of the ratio of the next step to this one, after an accepted step.
 
-        Smaller of two proposals (after Gustafsson 1991, 1994): from the last two errors; and from errors and steps, if
-        these continue to change as between the last two steps. Before a slip event steps shrink by a constant factor,
-        and the second proposal is right; after it they grow again, and the first is better.
+        It is the smaller of two proposals (after Gustafsson 1991, 1994). The first follows from the last two errors;
+        the second assumes that errors and steps continue to change as between the last two steps. Before a slip event
+        steps shrink by a constant factor, and the second proposal is right; after it steps grow, and the first is
+        better.
         """
         per = 0.5 / self.kernel.method.order
         goal = LOG_SAFETY / per

@@ -61,7 +61,10 @@ def located(R: Array, layout: Layout, routines: Routines, kind: int, y: Array) -
 def process_events(
     R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array, order: Array
 ) -> bool:  # fmt: skip
-    """Record the events of the last step in order of time; if contact is lost, the step ends there: returns True."""
+    """Record the events of the last step in order of time.
+
+    If contact is lost, the step ends there, and True is returned.
+    """
     tau_old, h = R[Row.TAU_OLD], R[Row.STEP_SIZE]
     each, count = events_per_contact(layout), 0
     for e in range(layout.events if R[Row.EVENT_COUNT] > 0.0 else 0):

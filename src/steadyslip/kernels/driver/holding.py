@@ -121,7 +121,7 @@ def least_of(row: Array, way: int) -> float:
 
 
 def keep_values(values: Array, clock: Array, rows: Array, length: float) -> None:
-    """Append the values (error, speed, force, others) at the nodes of a step to `rows`; update extremes of the stroke.
+    """Append values (error, speed, force, ...) at the nodes of a step to `rows`; update the extremes of the stroke.
 
     The step begins at `Held.TIME`. At rest only some steps are stored (`RESTED`).
     """
@@ -265,7 +265,9 @@ def follow_held(
     guards: Array, watched: Array, lengths: Array, passages: Array, loops: Array, late: Array, Y: Array, clock: Array,
     control: Array, rows: Array, fresh: int,
 ) -> int:  # fmt: skip
-    """Advance up to `Held.END`, from sample to sample if there are some; returns what the caller must do (`Turn`).
+    """Advance up to `Held.END`, from sample to sample if the controller samples.
+
+    Returns what the caller must do (`Turn`).
 
     Each passage has a row of `lengths`: time (s) and number of equal parts; without samples there is one passage. If
     `fresh`, only the sample that is due is taken, and the step after it is left to the caller. `rows` must have room

@@ -73,7 +73,7 @@ def load_job(
 
 
 def exhausted(S: Array, lanes: int, lane: int) -> int:
-    """STUCK or TOO_MANY_STEPS for a lane with too many rejected steps in a row, or too many steps; else RUNNING."""
+    """Status of a lane: STUCK or TOO_MANY_STEPS after too many rejected steps in a row, or steps; else RUNNING."""
     if S[Row.FAILURES * lanes + lane] >= MOST_FAILURES:
         return Status.STUCK
     if S[Row.ACCEPTED * lanes + lane] + S[Row.REJECTED * lanes + lane] >= S[Row.MOST_STEPS * lanes + lane]:
@@ -210,7 +210,7 @@ def serve_lane(
     R: Array, layout: Layout, routines: Routines, lane: int, ids: Array, cursor: Array, arrays: Arrays,
     results: Results, y: Array, order: Array,
 ) -> None:  # fmt: skip
-    """Continue the job of a lane whose flag is set, or finish it and start the next job there."""
+    """Continue the job of a lane whose flag is set, or finish it and start the next job in this lane."""
     j = ids[lane]
     if j >= 0:
         status = continue_job(R, layout, routines, j, cursor, arrays, results, y, order)

@@ -24,7 +24,7 @@ def take_samples(
 ) -> None:
     """Store the state at each requested time that the step has passed, by dense output.
 
-    With `at_end` (of the run), the current state is stored instead. A sample at a breakpoint belongs to the segment
+    With `at_end`, the end of the run, the current state is stored. A sample at a breakpoint belongs to the segment
     that begins there, a sample at the end of the run to the last segment.
     """
     arrived = R[Row.TAU] >= R[Row.LENGTH]

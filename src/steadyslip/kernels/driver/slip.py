@@ -26,7 +26,7 @@ def track_slowest(R: Array, layout: Layout, contact: int, slowest: float, tau: f
 
 
 def mark_fast(R: Array, layout: Layout, contact: int, y: Array) -> None:
-    """Mark the slip in progress as fast if its speed is SLIP_EVENT times the load point's and its own lowest speed.
+    """Mark the slip in progress as fast if its speed is SLIP_EVENT times its lowest, and the load point's.
 
     While the load point rests, the velocity of the drive is used in place of the load point's.
     """

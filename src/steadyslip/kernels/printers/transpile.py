@@ -147,7 +147,7 @@ class _Module:
         raise self.refuse(node, type(node).__name__)
 
     def _several(self, targets: list[ast.expr], value: ast.expr) -> list[str]:
-        """Assignments of several targets: in turn if no value reads a target, else at once."""
+        """Assignments to several targets: one after the other if no value reads a target, else all at once."""
         if isinstance(value, ast.Name):
             return [f"[{', '.join(map(self._write, targets))}] = {self._write(value)};"]
         if not isinstance(value, ast.Tuple) or len(value.elts) != len(targets):

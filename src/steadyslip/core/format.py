@@ -79,7 +79,7 @@ def _is_own(name: str) -> bool:
 
 
 def _at_one_load(names: tuple[str, ...], load: float | None) -> tuple[str, ...]:
-    """Units at one `load` (N) among units such as ``N/um at 3 kN``; all `names` if they are not at a load.
+    """Units at one `load` (N), taken from units such as ``N/um at 3 kN``; all `names` if they are not at a load.
 
     A unit for the load is made if it is missing. None stands for the largest load; 0 gives an empty tuple.
     """
@@ -216,7 +216,7 @@ def written_unit(value: float, si_unit: str) -> str:
 def format_as_written(value: float, own: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
     """Text of an SI value of a parameter in the unit in which the file has its present value `own` (SI).
 
-    If that unit is not known, or the number would be too long in it, the same text as `format_quantity`.
+    If that unit is not known, or the number would be too long in it, the text is that of `format_quantity`.
 
     >>> from steadyslip.core.written import display_units
     >>> with display_units(["kN"]):

@@ -177,7 +177,7 @@ BY_ANNOTATION: dict[str, Role] = {
 
 
 def role_of(name: str, annotation: str) -> Role | None:
-    """Role of an argument, by its name if that always has one meaning, else by its annotation; None if unknown."""
+    """Role of an argument: by its name if the name always has one meaning, else by its annotation; None if unknown."""
     if name in BY_WORD:
         return BY_WORD[name]
     plain = annotation.removesuffix(" | None")

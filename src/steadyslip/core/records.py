@@ -27,7 +27,7 @@ from steadyslip.core.roles import Entry, Parameter, Role, Series, Total, fault
 
 @dataclass(frozen=True)
 class Part(Role):
-    """Role of a field that holds another record; with ``inline`` its parameters have dotted names like the owner's own.
+    """Role of a field that holds another record; with ``inline`` its parameters are named like those of the owner.
 
     With ``many`` it holds a tuple of records: in files a list of tables, or with ``by_name`` tables named after their
     laws. With ``keyed`` it holds `Members`: in files a table of tables, each under a user-given name.

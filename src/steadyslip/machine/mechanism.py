@@ -79,12 +79,12 @@ class Integral:
 
 @dataclass(frozen=True)
 class Limits:
-    """Nonlinear parts of a controller that holds a place, in SI units; None for those it does not have.
+    """Nonlinear parts of a controller that holds a place, in SI units; None for each part that it does not have.
 
     Attributes
     ----------
     on_measurement : bool
-        True if the derivative is that of the measured place, not of the error.
+        True if the derivative is taken of the measured place, not of the error.
     force, integral : float or None
         Largest force of all terms, and of the integral term.
     dead_band : float or None
@@ -197,8 +197,8 @@ class Mechanism:
     def pulling(self, port: ContactPort) -> list[Element]:
         """Elements whose forces add up to the pull T at a contact.
 
-        That is the element in `loaded_by` if given, else all elements that do not end at the ground. For a body that
-        lies on the moving load point it is all elements that do not end at the load point.
+        If `loaded_by` is given, this is the named element, else all elements that do not end at the ground. For a body
+        that lies on the moving load point, it is all elements that do not end at the load point.
         """
         if port.loaded_by:
             return [one for one in self.elements if one.name == port.loaded_by]

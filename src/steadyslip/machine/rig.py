@@ -21,7 +21,7 @@ S = TypeVar("S", bound="Rig")
 
 
 class LawsOfContact(NamedTuple):
-    """Laws of one contact, prefix of their parameters' names, and area (m²) of a machine's contact, None without."""
+    """Laws of one contact, prefix of the names of their parameters, and area (m²) of a machine's contact or None."""
 
     prefix: str
     friction: FrictionLaw
@@ -239,7 +239,10 @@ class Rig(FrozenRecord, HasCache):
         raise NotImplementedError
 
     def parameter_along(self, name: str) -> str:
-        """Full name of a parameter; a slider's "stiffness" becomes axial_stiffness or kp if it has only those."""
+        """Full name of a parameter.
+
+        A slider's "stiffness" becomes axial_stiffness or kp if it has no other stiffness.
+        """
         return self.resolve(name)
 
     def resolve(self, name: str) -> str:

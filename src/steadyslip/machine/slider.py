@@ -105,7 +105,10 @@ class Slider(Rig, section="slider"):
             yield Condition("stiffness", np.asarray(gain) > 0, message, (gain,))
 
     def stiffness_name(self) -> str:
-        """Dotted name of the parameter given as stiffness: of the spring, along slide or axis, or else a gain."""
+        """Dotted name of the stiffness that was given: of the spring, along the slide or its axis.
+
+        Else a controller's gain.
+        """
         own = [name for name in self.of_kind("stiffness") if not name.startswith("drive.")]
         return (own or [name for name in self.of_kind("stiffness") if self.value(name)] or ["slider.stiffness"])[0]
 

@@ -12,7 +12,7 @@ import typer
 
 from steadyslip.core.version import stamped
 
-_WIDTH = 120  # characters of a line, those of printed tables
+_WIDTH = 120  # characters in a line, as in printed tables
 
 
 def print_text(text: str) -> None:

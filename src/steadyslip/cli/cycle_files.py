@@ -65,7 +65,7 @@ def cycles_of_file(
 
 
 def _nearest_oscillation(machine: Slider | Machine) -> str:
-    """Name of the link or drive parameter with the nearest oscillatory edge, or of any parameter if these have none."""
+    """Name of the link or drive parameter with the nearest oscillatory edge; of any parameter if these have none."""
     found = margins(machine)
     built = [one for one in found if one.parameter.startswith(("links.", "drive."))]
     nearest = oscillatory_edge(built) or oscillatory_edge(found)
@@ -98,7 +98,7 @@ def thresholds_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str,
     at: str | None = None, up_to: float | None = None,
 ) -> Thresholds:  # fmt: skip
-    """Thresholds of the rig of a file, for the kicks named, by default the usual ones."""
+    """Thresholds of the rig of a file for the given kinds of kick; by default for the usual kinds."""
     rig = read_rig(path, changes)
     usual = tuple(name for name, kick in kicks_of(rig).items() if kick.usual)
     options = {"at": at, "direction": -1 if reverse else 1, "reference": reference, "up_to": up_to}
@@ -143,7 +143,7 @@ def response_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], periods: tuple[str, str], points: int,
     amplitudes: Iterable[str], input: str, output: str | None, on: str | None, limits: bool,
 ) -> FrequencyResponse:  # fmt: skip
-    """Result of `steadyslip.response` for the rig of a file at `points` periods between two.
+    """Result of `steadyslip.response` for the rig of a file, at `points` periods between the two `periods`.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def write_answers(found: FrequencyResponse | FrozenVerdicts | Hunt, path: Path, 
 def verdicts_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], pieces: Iterable[str], until: str | None, rtol: float
 ) -> FrozenVerdicts:
-    """`steadyslip.frozen_verdicts` for the rig and the protocol of a file, and further pieces in words.
+    """Result of `steadyslip.frozen_verdicts` for rig and protocol of a file, and additional pieces given as text.
 
     Raises
     ------

@@ -22,14 +22,14 @@ import typer
 def end(command: Callable[[], object]) -> None:
     """Run a command and exit with its status."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # letters that the console lacks are replaced
+        if isinstance(stream, TextIOWrapper):  # letters that the console cannot show are replaced
             stream.reconfigure(errors="replace")
-    if sys.stdout is None:  # closed by the calling program
+    if sys.stdout is None:  # standard output was closed by the calling program
         sys.exit(print_message("there is no standard output to write the answer to", 2))
     with warnings.catch_warnings():
         warnings.showwarning = partial(_show_warning, warnings.showwarning)
         status = status_of(command)
-    gc.freeze()  # spares the garbage collections of the ending interpreter, a fifth of the time of a verdict
+    gc.freeze()  # avoids garbage collections when Python ends, a fifth of the time of a verdict
     sys.exit(status)
 
 
@@ -43,7 +43,7 @@ def status_of(command: Callable[[], object]) -> int:
         command()
     except SystemExit as left:
         status = left.code if isinstance(left.code, int) else 0 if left.code is None else 2
-    except KeyboardInterrupt:  # before a command began
+    except KeyboardInterrupt:  # Ctrl-C before a command began
         status = 130
     except OutputClosed:
         status = 141
@@ -53,7 +53,7 @@ def status_of(command: Callable[[], object]) -> int:
         status = print_message("there is not enough memory for this; ask for fewer points, samples or runs", 2)
     except OSError as error:
         status = print_message(_system_error_text(error), 2)
-        if error.filename is None:  # standard output: flushing the buffer would fail again
+        if error.filename is None:  # the error is of standard output: flushing the buffer would fail again
             from steadyslip.files.output import discard_output
 
             discard_output()

@@ -92,7 +92,7 @@ def fit(
         output_result(members, output or (), as_json, write_population)
         return
     own = records_of(plan, records, skip_bad_lines)
-    for record in () if as_json else own:  # before the search, which may take long
+    for record in () if as_json else own:  # printed before the search, which may take long
         print_text(f"{record}\n")
     found, comparison = cast("tuple[Fit, LawComparison | None]", fitted(plan, own))
     for path in others:

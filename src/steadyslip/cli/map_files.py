@@ -109,7 +109,7 @@ def sensitivity_file(
     elif plan.sampling is not None:
         raise NotAvailable("the draws of a fit depend on each other, and Sobol indices are for independent parameters")
     own = {one.name: one for one in plan.compute}
-    wanted = tuple(own.get(name, name) for name in of)  # with its options from the file
+    wanted = tuple(own.get(name, name) for name in of)  # the measure with its options from the file
     return sensitivity(plan.rig, ranges, wanted or _numeric_measures(plan), points=points, protocol=plan.protocol)
 
 

@@ -44,7 +44,7 @@ class _Conversion:
         self.by_typer = by_typer
 
     def coerce(self, value: Any, param: Any, ctx: Any) -> Any:
-        """Converted value; called by Typer with these names."""
+        """Convert a value; Typer calls this method with these argument names."""
         kind = param.type_descriptor.annotation
         if value is None:
             return () if param.multiple or param.nargs == -1 else None
@@ -59,7 +59,7 @@ class _Converting:
     """Commands whose parameters are converted by `_Conversion`."""
 
     def get_params(self, ctx: Any) -> list[Any]:
-        found: list[Any] = super().get_params(ctx)  # type: ignore[misc]  # of the class of Typer beside this one
+        found: list[Any] = super().get_params(ctx)  # type: ignore[misc]  # method of the other base class, from Typer
         for one in found:
             if hasattr(one, "get_runtime_param") and "get_runtime_param" not in vars(one):  # Typer from 0.29
                 one.get_runtime_param = partial(_Conversion, one.get_runtime_param)
@@ -105,7 +105,7 @@ def _start(version: Annotated[bool, typer.Option("--version", help="print the ve
 
 
 def _word(command: Callable[..., None]) -> str:
-    """Word for a command on the command line."""
+    """Name of a command on the command line, made from that of its function."""
     return command.__name__.rstrip("_")
 
 

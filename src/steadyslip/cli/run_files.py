@@ -82,7 +82,7 @@ def read_experiment(
     ParameterError
         If the file or an argument is invalid; lists all problems.
     """
-    changes = (changes,) if isinstance(changes, str) else tuple(changes)  # read twice
+    changes = (changes,) if isinstance(changes, str) else tuple(changes)  # iterated twice
     rig = read_rig(path, changes)
     protocol = read_protocol(path, changes) or Protocol()
     added = _pieces(pieces, rig)

@@ -82,8 +82,8 @@ _SKETCH_CAPTION = (
     "Motion is to the right. Thick bars and the rounded frame: the drive; dashed line: what it measures; arrows with a "
     "force: constant forces."
 )
-_MAX_ROWS = 12  # rows of a table of results, so that a notebook cell stays short (by trial)
-_MAX_VALUES = 4  # most numbers of an array that are printed; longer arrays as shape and range (by trial)
+_MAX_ROWS = 12  # largest number of rows of a table of results, so that a notebook cell stays short (by trial)
+_MAX_VALUES = 4  # an array with more numbers is printed as shape and range (by trial)
 
 
 def brief(result: Any) -> str:
@@ -153,7 +153,7 @@ def text_html(text: str, caption: str = "") -> str:
 def _is_wrapped(line: str, after: str, indent: int) -> bool:
     """True if the line `after` seems to continue the sentence of `line`, which looks wrapped at a terminal's width.
 
-    It does not if it is indented less than `indent`, or begins with a few words and a colon.
+    A line that is indented less than `indent`, or begins with a few words and a colon, does not continue a sentence.
     """
     cut = len(line) > 60 and line[-1] not in ".:;)"
     return cut and len(after) - len(after.lstrip()) >= indent and not re.match(r" *[A-Za-z][\w ]{0,20}: ", after)
@@ -259,7 +259,7 @@ def unit_of(result: Any, name: str) -> str:
 
 
 def _named_cell(result: Any, name: str, value: Any, area: float | None) -> Any:
-    """`_cell` of an attribute of a result; rates stay in SI units instead of those that a rig file uses."""
+    """Table cell of an attribute of a result; rates are in SI units, not in the units of the rig file."""
     unit = unit_of(result, name)
     if name in _RATES:
         with si_units():
@@ -268,7 +268,7 @@ def _named_cell(result: Any, name: str, value: Any, area: float | None) -> Any:
 
 
 def _cell(value: Any, unit: str, area: float | None) -> Any:
-    """Text or HTML of a value with its unit; empty for None, NaN and sequences of results."""
+    """Table cell of a value with its unit, as text or HTML; empty for None, NaN and sequences of results."""
     if value is None or isinstance(value, bool | np.bool_ | str):
         return "" if value is None else str(value) if isinstance(value, str) else "yes" if value else "no"
     if isinstance(value, int | np.integer) and unit == "1":
@@ -292,7 +292,10 @@ def _cell(value: Any, unit: str, area: float | None) -> Any:
 
 
 def _format_array(values: np.ndarray, unit: str, area: float | None) -> str:
-    """Text of an array: its values if at most `_MAX_VALUES`, else shape and range; of text, counts of each."""
+    """Text of an array: its values if there are at most `_MAX_VALUES`, else shape and range.
+
+    For an array of words, the number of times that each occurs.
+    """
     if values.size == 0:
         return "none"
     if values.dtype.kind not in "fiu":
@@ -329,7 +332,7 @@ def _results_table(results: Iterable[Any], area: float | None) -> str:
     every = dict.fromkeys(name for one in many for name, _ in _shown_attributes(one))
     names = [name for name in every if any(_short_cell(one, name, area) for one in many)]
     rows = [[_short_cell(one, name, area) for name in names] for one in many[:_MAX_ROWS]]
-    if not names or len({type(one) for one in many}) > 1:  # mixed kinds, or nothing else to show
+    if not names or len({type(one) for one in many}) > 1:  # results of different kinds, or without anything to show
         names = ["kind", *names]
         rows = [[getattr(one, "name", type(one).__name__), *row] for one, row in zip(many, rows, strict=False)]
     more = paragraph(f"and {len(many) - _MAX_ROWS} more", "small") if len(many) > _MAX_ROWS else ""

@@ -107,7 +107,7 @@ def document_html(
     source = sources[0] if sources else None
     live = ""
     if explorer and parts.rig is not None:
-        with suppress(NotAvailable):  # such as for a drive that holds a position
+        with suppress(NotAvailable):  # raised for a drive that holds a position, for example
             live = fragment(parts.rig, title, parts.branch, source_text(source), "light")
     shown = heading("Try other values") + paragraph("Below, everything is computed in this page.") if live else ""
     article = (
@@ -150,7 +150,7 @@ def _rig_listing(parts: Parts, source: Path | None) -> str:
         return parts.rig_file
     try:
         whole = read_whole(source)
-    except ParameterError:  # not a file of a rig
+    except ParameterError:  # the file has no rig
         return parts.rig_file
     same = whole.rig == parts.rig and (parts.protocol is None or whole.protocol == parts.protocol)
     return own if same else parts.rig_file

@@ -20,18 +20,18 @@ _REPLACEMENTS = (
     (r"^x (?=-?\d)", "× "), (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"),
 )  # fmt: skip
 _SUBSCRIPT = re.compile(r"(?<![\w.])(?!^\w+$)([A-Za-zΑ-ω])_(\w+)(?!\.?\w)")  # not in dotted names, or a key alone
-_NUMBER = re.compile(r"(?<=\d) (?=[^\s\d(])|(?<=[±×]) (?=[\d∞])")  # space behind a number
+_NUMBER = re.compile(r"(?<=\d) (?=[^\s\d(])|(?<=[±×]) (?=[\d∞])")  # space after a number
 _POWER = re.compile(r"(?<=10)([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+) (?=[A-Za-zµ])")  # space between a power of ten and its unit
-_SLASH = re.compile(r"(\d\u00a0(?:[^\s/]+\u00a0)?[^\s/]+/)(?=\S)")  # slash within a unit behind its number: 5 N/µm
+_SLASH = re.compile(r"(\d\u00a0(?:[^\s/]+\u00a0)?[^\s/]+/)(?=\S)")  # slash within a unit after its number: 5 N/µm
 _UNIT = r"[mkMGTnµ]?(?:N|m|s|g|Pa|J|W|rad)|[cd]m|deg|rev"
 _WITHIN = re.compile(
     rf"(?<=\d\u00a0)(?:{_UNIT})[²³]?(?: (?:{_UNIT})[²³]?(?![\w.]))+"
-)  # unit of several words behind its number
-_LONG = 30  # characters of a word above which it may be broken anywhere, such as a hash
-_NARROW = 3  # most columns that fit on a telephone (by trial, at 360 px)
-_NARROW_LINE = 44  # most letters of 13 px in a line of a telephone's screen (358 px)
-_LINE = 90  # characters of plain text in a line of a formula (by trial, for the width of a page)
-_PIECE = 30  # most characters of a part of a formula that is never broken: some 300 px of the 358 px of a telephone
+)  # unit of several words after its number
+_LONG = 30  # a word with more characters, such as a hash, may be broken anywhere
+_NARROW = 3  # largest number of columns that fit on a telephone's screen (by trial, at 360 px)
+_NARROW_LINE = 44  # largest number of letters of 13 px in a line of a telephone's screen (358 px)
+_LINE = 90  # largest number of characters in a line of a formula (by trial, for the width of a page)
+_PIECE = 30  # largest number of characters in an unbreakable part of a formula: 300 of the 358 px of a telephone
 _ZERO = '<mrow><mo form="infix">=</mo><mn>0</mn></mrow>'
 _ENTITIES = {"&InvisibleTimes;": "\u2062", "&dd;": "d", "&ExponentialE;": "e", "<mo>-</mo>": "<mo>−</mo>"}
 STYLE = """
@@ -105,7 +105,7 @@ def typographic(text: Any) -> str:
 
 
 def why(refused: Exception) -> str:
-    """Reason given by an error, without its advice on calls, which the reader of a document cannot make."""
+    """Reason given by an error, without advice on function calls, which readers of a document cannot make."""
     return re.split(r"; (?:offered are|ask `|stable_stiffness)", str(refused))[0]
 
 
@@ -190,7 +190,7 @@ def _breakable(name: str) -> str:
 
 
 def _width_class(cell: str) -> str:
-    """HTML class attribute of a cell: short ones (value with unit) stay on one line, long words break anywhere."""
+    """HTML class attribute of a cell: short cells (value with unit) stay on one line, long words break anywhere."""
     if max(map(len, cell.split()), default=0) > _LONG and "<" not in cell:
         return " class=l"
     return " class=n" if len(cell) <= 20 and re.search("[ \u00a0]", cell) else ""
@@ -233,7 +233,7 @@ def _term(text: str, first: bool) -> list[str]:
 
     The sign is an infix operator, with space on both sides, unless the term is the first.
     """
-    if not first and re.match("(<mrow>)*<mo>−</mo>", text):  # sign of the term, not of a numerator
+    if not first and re.match("(<mrow>)*<mo>−</mo>", text):  # the minus sign belongs to the term, not to a numerator
         text = text.replace("<mo>−</mo>", '<mo form="infix">−</mo>', 1)
     elif not first:
         text = f'<mo form="infix">+</mo>{text}'
@@ -265,7 +265,7 @@ def _pieces(element: ElementTree.Element, most: int = _PIECE) -> list[list[Eleme
             child.set("form", "infix" if n else "prefix")
         if n and (sign or (child.text == "/" and "".join(element[n - 1].itertext()).endswith(")"))):
             groups.append([])
-        if child.get("symmetric"):  # bracket around a fraction that may be in another piece: fix its height
+        if child.get("symmetric"):  # fix the height of a bracket, as the fraction within may be in another piece
             child.set("minsize", "2.2em")
         groups[-1].append(child)
     found: list[list[ElementTree.Element]] = []
@@ -341,7 +341,7 @@ class _Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no
 
     def _print_Mul(self, expression: sp.Mul) -> Any:  # noqa: N802 -- SymPy's name
         above, below = sp.fraction(expression)
-        wide = max(len(str(above)), len(str(below))) > _LINE  # a fraction cannot be broken, a quotient can
+        wide = max(len(str(above)), len(str(below))) > _LINE  # lines can be broken in a quotient, not in a fraction
         if below == 1:
             return super()._print_Mul(expression)
         if not (self._inline or wide):  # fractions within a fraction are on one line

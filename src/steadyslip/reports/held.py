@@ -17,9 +17,9 @@ from steadyslip.nonlinear.hunting.hunt import hunt
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 from steadyslip.reports.elements import heading, paragraph, table
 
-BAND = 2.0  # dead band tried, as a multiple of the hunting amplitude; one slightly wider than the cycle only slows it
-STIFFER = 2.0  # factor tried on all gains
-LONGER = 4.0  # length of runs with changes over that of the run without: bounds computing time
+BAND = 2.0  # dead band that is tried, over the hunting amplitude; a band hardly wider than the cycle only slows it
+STIFFER = 2.0  # factor by which all gains are multiplied as a trial
+LONGER = 4.0  # runs with changes are at most this many times as long as the run without; bounds computing time
 WHY = "it hunts because the integral winds up while friction at rest, larger than in sliding, holds the axis"
 _ON_TARGET = "in the end on the target, which its ever smaller strokes approach"
 HOLDS = (
@@ -48,9 +48,9 @@ class Tried:
 
     @property
     def reach(self) -> float:
-        """Largest distance from the target (m or rad) at the end of this run or of others."""
+        """Largest distance from the target (m or rad) at which the axis may end, in this run or in others."""
         rests = np.isfinite(self.then.settled_at) or self.then.hunts
-        return max(self.least, _reach(self.then) if rests else 0.0)  # ever smaller strokes: it ends on the target
+        return max(self.least, _reach(self.then) if rests else 0.0)  # ever smaller strokes end on the target
 
     def verdict(self, allowed: float) -> str:
         """Text on whether the change is a cure; `allowed` is the acceptable distance from the target (m or rad)."""
@@ -65,7 +65,7 @@ def recommendation(result: Hunt) -> Iterator[str]:
     """HTML of the changes that end hunting, each simulated alone; if the axis settles, its distance from the target.
 
     A change counts as a cure only if the axis then rests within the dead band of its controller or, without a dead
-    band, nearer to the target than the amplitude of its hunting now.
+    band, nearer to the target than its present hunting amplitude.
     """
     yield heading("The recommendation")
     if result.runs_away:
@@ -85,7 +85,7 @@ def recommendation(result: Hunt) -> Iterator[str]:
 
 
 def _cures(result: Hunt) -> Iterator[str]:
-    """HTML of the changes that were tried, the best first, with the distance from the target that each leaves."""
+    """HTML of the changes that were tried, the best first, each with the distance from the target that it leaves."""
     unit, own, limits = result.unit, _reach(result), result.rig.drive.limits()
     asked = limits.dead_band if limits else None
     allowed = own if asked is None else float(asked) * _result_over_measured(result)
@@ -117,7 +117,7 @@ def _cures(result: Hunt) -> Iterator[str]:
 
 
 def _result_over_measured(result: Hunt) -> float:
-    """Ratio of the motion of the body that results refer to to the motion of the body that the controller measures."""
+    """Motion of the body to which results refer, per motion of the body that the controller measures."""
     return result.rig.feed()[0] / result.rig.seen()[0]
 
 
@@ -126,7 +126,7 @@ def _reach(result: Hunt) -> float:
 
 
 def _changed(result: Hunt) -> Iterator[tuple[str, Any, float]]:
-    """Changes that may end hunting: text, changed rig, and distance from the target that it may leave (m or rad)."""
+    """Yield changes that may end hunting: text, changed rig, and distance (m or rad) from target that may be left."""
     rig: Any = result.rig
     known = rig.parameters()
     rest = {

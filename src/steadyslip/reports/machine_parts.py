@@ -20,7 +20,7 @@ from steadyslip.verdict.machine import nearest_edge
 from steadyslip.verdict.whole_text import facts
 from steadyslip.verdict.words import EIGENVALUE_COLUMNS, eigenvalue_row, format_parameter, headline
 
-_MAX_ROOTS = 12  # rows of the table of eigenvalues, so that it fits half a page (by trial)
+_MAX_ROOTS = 12  # largest number of rows of the table of eigenvalues, so that it fits half a page (by trial)
 
 
 def verdict_parts(analysis: Analysis, tolerated: Tolerated | None = None, order: Order = ORDER) -> Parts:
@@ -45,7 +45,7 @@ def verdict_parts(analysis: Analysis, tolerated: Tolerated | None = None, order:
 
 
 def _settable_edge(analysis: Analysis) -> str:
-    """Sentence on the nearest edge among changeable parameters, if another parameter has the nearest edge of all."""
+    """Sentence on the nearest edge of a changeable parameter, if a parameter that cannot change has a nearer edge."""
     edged = [one for one in analysis.margins if one.edge is not None]
     able = {one.parameter for one in changeable(analysis)}
     settable = next((one for one in edged if one.parameter in able), None)
@@ -73,7 +73,7 @@ def _verdict_section(analysis: Analysis) -> Iterator[str]:
         return
     yield table(
         (row for row in facts(analysis) if row[0] != "steady sliding"), caption="The verdict."
-    )  # steady sliding has a table of its own below
+    )  # steady sliding has its own table below
     contacts = [
         (name, format_quantity(one.slip_rate, "m/s"), format_quantity(one.normal_force, "N"),
          format_quantity(one.friction_force, "N"), f"{one.friction:.4g}")

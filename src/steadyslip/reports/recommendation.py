@@ -24,13 +24,13 @@ from steadyslip.verdict.cures import default_adjust
 from steadyslip.verdict.tolerances import LEAST, format_chance
 from steadyslip.verdict.words import change_to, format_parameter
 
-BEYOND_EDGE = 0.2  # recommended distance of a value from an edge, as share of the value: allows 10 % error in each
+BEYOND_EDGE = 0.2  # recommended distance of a value from an edge, as share of the value: for errors of 10 % in both
 _ROUNDED = 1.01  # factor on `BEYOND_EDGE`: values rounded to four digits still keep that distance
-FAR = 10.0  # changes by a larger factor are only named, without values: nobody orders such a part
-SURE = 0.95  # chance of stable sliding from which a rig is kept as it is; default of `cure`
-_ROWS = 4  # most changes recommended
-_STEPS = (1.1, 1.25, 1.5, 2.0)  # factors on a value tried to move a stable rig away from its edges (by trial)
-_FARTHER = (1.5, 2.0, 3.0, 4.0)  # factors on an edge tried if another edge is close to the first value (by trial)
+FAR = 10.0  # for a change by a larger factor no value is given, as nobody orders such a part
+SURE = 0.95  # a rig is kept as it is if its chance of stable sliding is at least this; default of `cure`
+_ROWS = 4  # largest number of changes that are recommended
+_STEPS = (1.1, 1.25, 1.5, 2.0)  # factors on values that are tried to move a stable rig away from its edges (by trial)
+_FARTHER = (1.5, 2.0, 3.0, 4.0)  # factors on an edge, tried if another edge is close to the first value (by trial)
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def _within(tolerated: Tolerated) -> str:
 
 
 def _is_far(value: float, to: float | None) -> bool:
-    """True if a change of `value` to `to` is by more than a factor of `FAR`, or either is zero or None."""
+    """True if a change from `value` to `to` is by more than a factor of `FAR`, or if one of them is zero or None."""
     return to is None or not value or not to or not 1 / FAR <= abs(to / value) <= FAR
 
 
@@ -266,13 +266,13 @@ def changeable(analysis: Analysis, adjustable: Collection[str] = ()) -> list[Mar
     """
     edged = [one for one in analysis.margins if (one.edge if analysis.stable else _curing(one))]
     chosen = [one for one in edged if one.parameter in adjustable]
-    present = [one for one in edged if one.value]  # from zero it is no change, but a part to be added
+    present = [one for one in edged if one.value]  # a value of zero cannot be changed: the part would have to be added
     found = chosen or [one for one in present if "friction." not in one.parameter] or present
     return found if analysis.stable or chosen else sorted(found, key=_in_order)
 
 
 def _in_order(margin: Margin) -> tuple[bool, float, bool]:
-    """Sort key of a change: near before far; then by cost; then those whose stable window begins at `margin.edge`."""
+    """Sort key of a change: near before far, then by cost, then changes whose stable window begins at `margin.edge`."""
     begins = _curing(margin)[0]
     return _is_far(margin.value, begins.value), unit_cost(margin.parameter), begins is not margin.edge
 
@@ -335,7 +335,7 @@ def _kept_apart(
 
 
 def _movable(analysis: Analysis, adjustable: Collection[str]) -> list[Margin]:
-    """Margins of parameters to change so that a stable rig moves away from its edges: nearest edges; the speed last."""
+    """Margins of the parameters to change to move a stable rig away from its edges: nearest edge first, speed last."""
     able = [one for one in changeable(analysis, adjustable) if one.value and one.unit != "rad" and not one.remote]
     return sorted(able[:_ROWS], key=lambda one: unit_cost(one.parameter))
 
@@ -375,7 +375,7 @@ def _moved_away(analysis: Analysis, margin: Margin) -> _Moved | None:
 
 
 def _tried(analysis: Analysis, margin: Margin, values: Sequence[float]) -> list[_Moved]:
-    """Results for those `values` of a parameter at which sliding is stable, up to the first with all edges far."""
+    """Results for those `values` of a parameter at which sliding is stable, up to the first whose edges are all far."""
     rig: Any = analysis.rig
     found = []
     for to in values:
@@ -395,7 +395,7 @@ def _tried(analysis: Analysis, margin: Margin, values: Sequence[float]) -> list[
 
 
 def _made_by(analysis: Analysis, margin: Margin, values: Sequence[float]) -> _Moved | None:
-    """Result for the first of `values` with all edges far, else for the first that is stable; None if there is none."""
+    """Result for the first of `values` whose edges are all far, else for the first stable value; None without one."""
 
     found = _tried(analysis, margin, values)
     return next((one for one in found if one.distance >= BEYOND_EDGE), found[0] if found else None)
@@ -437,7 +437,7 @@ def _begun(analysis: Analysis, margin: Margin, within: Adjustment | None) -> _Be
         sign = 1 if rises == (edge > 0) else -1
         if margin.unit == "rad":
             values = [edge + BEYOND_EDGE * (edge - margin.value)]
-        else:  # the first value has the recommended distance from the edge
+        else:  # the first of the values has the recommended distance from the edge
             values = [edge / (1 - sign * _ROUNDED * BEYOND_EDGE), *(edge * step**sign for step in _FARTHER)]
         values = _allowed(values, edge, rises, within)
         if not values:
@@ -451,7 +451,7 @@ def _begun(analysis: Analysis, margin: Margin, within: Adjustment | None) -> _Be
 
 
 def _allowed(values: Sequence[float], edge: float, rises: bool, within: Adjustment | None) -> list[float]:
-    """Values beyond an edge, clipped to the range allowed; empty if that ends before the edge."""
+    """Values beyond an edge, limited to the allowed range; empty if the allowed range ends before the edge."""
     if within is None:
         return list(values)
     low = -math.inf if within.low is None else within.low

@@ -41,7 +41,7 @@ from steadyslip.reports.sections import notes_of, references
 from steadyslip.verdict import Analysis, Cures, Tolerated, analyze, tolerate
 from steadyslip.verdict.words import format_parameter_range
 
-MAX_ROWS = 24  # rows of a table of slip events or cycles, so that a document stays short (by trial)
+MAX_ROWS = 24  # largest number of rows of a table of slip events or cycles, so that a document stays short
 PHASE_PLANE = "Spring stress over velocity; black: steady sliding at every velocity, the dot at that of the load point."
 CONTACT_PHASE_PLANE = (
     "Friction force over slip rate; black: steady sliding at any velocity, the dot at that of the drive."
@@ -212,7 +212,7 @@ def _of_held(rig: Slider | Machine, source: str, asked: Any) -> Parts:
             "the drive holds a position (velocity = 0), so the document is on whether the axis hunts; leave out "
             "branch, fit, tolerances and charts, which have no effect on that"
         )
-    return replace(_hunt(hunt(rig), source), protocol=None)  # list the rig's own file, without the disturbance tried
+    return replace(_hunt(hunt(rig), source), protocol=None)  # list the rig's own file, without the tried disturbance
 
 
 @parts_of.register
@@ -384,7 +384,7 @@ def _branch(result: CycleBranch) -> Parts:
 
 
 def _distinct_rows(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Rows that differ from the row before in the first three cells; thinned evenly to `MAX_ROWS` at most."""
+    """Rows whose first three cells differ from those of the previous row, thinned evenly to at most `MAX_ROWS`."""
     apart = [row for i, row in enumerate(rows) if i == 0 or row[:3] != rows[i - 1][:3]]
     step = max(1, -(-len(apart) // MAX_ROWS))
     return apart[::-step][::-1]

@@ -74,7 +74,7 @@ def verdict_parts(
         heading("The rig"), sketch_of(rig),
         input_table(rig, tolerances_of(tolerated), notes_of(order.source)),
         heading("The verdict"), table(facts(analysis), caption="The verdict."),
-        *(paragraph(text) for text in meaning(analysis) if "steadyslip" not in text),  # the motion is below
+        *(paragraph(text) for text in meaning(analysis) if "steadyslip" not in text),  # motion has a section below
         *_confidence_section(prediction), *tolerance_section(tolerated),
         heading("How far is the edge?"), *edge_table(analysis), *checks_line(analysis),
         *_chart_section(analysis, order), *motion(analysis, source=order.source),
@@ -129,7 +129,10 @@ def input_table(
 
 
 def _fed_body(rig: Slider | Machine, name: str) -> str:
-    """Clause on the body to which the printed drive speed refers, and on the speed in the equations; empty if equal."""
+    """Clause on the body whose speed is printed as the drive's, and on the drive speed in the equations.
+
+    Empty if both speeds are equal.
+    """
     in_si = Rig.display_value(rig, name, 1.0)
     if rig.fed is None or name != "drive.velocity" or rig.display_value(name, 1.0) == in_si:
         return ""
@@ -138,12 +141,15 @@ def _fed_body(rig: Slider | Machine, name: str) -> str:
 
 
 def _remark(notes: Mapping[str, str], name: str) -> str:
-    """Comment on a value in its file, without backticks; ``rig file`` without comment, ``default`` if not in it."""
+    """Comment on a value in the rig file, without backticks.
+
+    ``rig file`` if the value has no comment, ``default`` if the file does not give the value.
+    """
     return (notes[name].replace("`", "") or "rig file") if name in notes else "default"
 
 
 def _meaning(one: Address, letter: str) -> str:
-    """Meaning of a parameter, with its `letter`; for effects of friction also what they do."""
+    """Meaning of a parameter, with its `letter`; for parameters of friction effects also what the effect does."""
     kind, doc = one.role.kind, one.role.meaning
     if "_" in letter:  # "Kp" of a description is the letter K_p
         doc = re.sub(rf"\b{letter.replace('_', '')}\b", letter, doc)
@@ -151,7 +157,7 @@ def _meaning(one: Address, letter: str) -> str:
 
 
 def edge_table(analysis: Analysis) -> Iterator[str]:
-    """HTML table of the nearest edge of every parameter, and a line of the parameters without one."""
+    """HTML table of the nearest edge of every parameter, and a line that names parameters without an edge."""
     rig, far = analysis.rig, [one.parameter for one in analysis.margins if one.remote]
     without = [one.parameter for one in analysis.margins if one.edge is None]
     if rows := [row for one in analysis.margins if not one.remote for row in edge_rows(analysis, one)]:
@@ -224,7 +230,7 @@ def formula_section(analysis: Analysis) -> Iterator[str]:
 
 
 def motion_equations(rig: Slider | Machine, printed: Sequence[sp.Eq] = ()) -> Iterator[str]:
-    """HTML of the equations of motion, and table of the letters in them and in the equations `printed` before."""
+    """HTML of the equations of motion, and a table of the letters in these and in the earlier equations `printed`."""
     if by_matrices(rig):
         yield paragraph("The equations of motion are matrices, too large to be printed.")
         return

@@ -40,9 +40,9 @@ from steadyslip.verdict.judder import STEP, grown, motion_after
 from steadyslip.verdict.words import PACE, format_parameter_range
 
 CUT_SHORT = "too many steps"
-_NEARLY = 0.01  # relative deviation from steady sliding below which a motion counts as steady again
-SWINGS_DRAWN = 30  # swings in a figure 100 mm wide, 3 mm each; if there are twice as many, only the last are drawn
-_LONGEST_UNIT = 12  # most characters of a comment that is taken as a unit: N m s/rad has 9
+_NEARLY = 0.01  # a motion counts as steady again if it deviates from steady sliding by less than this share
+SWINGS_DRAWN = 30  # number of last swings drawn (3 mm each in 100 mm) if there are more than twice as many
+_LONGEST_UNIT = 12  # a comment with more characters is not taken as a unit: N m s/rad has 9
 
 
 def assumptions(rig: Slider | Machine, warnings: Sequence[str], validity: str) -> Iterator[str]:
@@ -75,7 +75,7 @@ def notes_of(text: str) -> dict[str, str]:
     for line in text.splitlines():
         if head := re.match(r"\s*(\[+)([\w.-]+)\]+", line):
             section = head[2]
-            if len(head[1]) > 1:  # one of several tables, which are counted from 1
+            if len(head[1]) > 1:  # a list of tables, whose members are counted from 1
                 many[section] += 1
                 section = f"{section}.{many[section]}"
         elif key := re.match(r"\s*([\w-]+)\s*=\s*(?:\"[^\"]*\"|[^#\"])*(?:#\s*(.*))?$", line):
@@ -104,7 +104,7 @@ def _keys(table: Mapping[str, Any], before: str = "") -> Iterator[str]:
 def motion(analysis: Analysis, title: str = "The motion", source: str = "") -> Iterator[str]:
     """HTML of the motion after a small disturbance: text, time history and phase plane.
 
-    `source` is the text of the rig file: if it has a protocol, a note says that this motion is not that protocol's.
+    `source` is the text of the rig file. If it has a protocol, a note says that the protocol is not used here.
     """
     yield heading(title)
     rig: Any = analysis.rig
@@ -226,7 +226,7 @@ def _half_time(analysis: Analysis) -> str:
 
 
 def letters(rig: Slider | Machine, printed: Iterable[sp.Basic]) -> str:
-    """HTML table of the letters in printed equations that are not inputs."""
+    """HTML table of those letters in printed equations that are not inputs."""
     model = build_model(rig)
     inputs = set(input_letters(model, rig).values())
     known = legend(model) | MEANINGS

@@ -47,7 +47,7 @@ def _comparison(result: RigComparison) -> Parts:
 
 
 def _assumed(result: RigComparison) -> Iterator[str]:
-    """HTML of the assumptions of both verdicts; those of one rig only begin with its name."""
+    """HTML of the assumptions of both verdicts; an assumption on one rig only begins with the name of that rig."""
     first, second = ([*assumptions(one.rig, one.warnings, VALIDITY)] for one in result.verdicts)
     yield from (part for part in first if part in second)
     for name, parts, others in zip(result.names, (first, second), (second, first), strict=True):
@@ -59,7 +59,7 @@ def _order(within: Tolerated | None) -> Order:
 
 
 def _answer(result: RigComparison) -> str:
-    """Sentences on the differences each of which alone changes the verdict, or on that with the largest part."""
+    """Sentences on the differences that change the verdict by themselves, or on the one with the largest part."""
     rig: Any = result.verdicts[0].rig
     if decisive := [worded(rig, text) for text in result.decisive()]:
         return f"{'; '.join(decisive)}."
@@ -74,7 +74,7 @@ def _answer(result: RigComparison) -> str:
 
 
 def _differences(result: RigComparison) -> Iterator[str]:
-    """HTML table of the differences with the part of each, and an explanation of parts."""
+    """HTML table of the differences, with the part of each in the change, and an explanation of parts."""
     rig: Any = result.verdicts[0].rig
     a, b = result.names
     known = bool(result.measure)

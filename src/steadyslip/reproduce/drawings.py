@@ -43,7 +43,7 @@ def paper_rig(angle: float = -45 * deg) -> Slider:
 SIGMA = 5 * MPa  # normal stress of Figs 1 and 2, Pa: the preload of `paper_rig`
 STEP_TIME = 1.0  # time of the step in Figs 1 and 2, s
 DIRECT_TIME = 1e-4  # time after the step at which the direct effect is read, s: 1e-4 of d_c/v0
-_STIFF = 1e16  # stiffness of the rig of Figs 1 and 2, Pa/m: a million times critical, so that slip follows the drive
+_STIFF = 1e16  # Pa/m, stiffness of the rig of Figs 1 and 2: a million times critical, so that slip follows the drive
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def simulate_shear(protocol: Any, slip: float = 8 * D_C) -> History:
 
 
 def _plot_step(ax: Any, run: History, direct: str, evolution: str) -> Any:
-    """Plot change of shear stress over slip, with labels at its direct and its evolving part."""
+    """Plot the change of shear stress over slip, with labels at the direct effect and at the evolution."""
     change = (run["shear_stress"] - run["shear_stress"][0]) / SIGMA
     slip = run["slip"] / D_C
     ax.plot(slip, change, color=palette.BLUE)

@@ -1,7 +1,7 @@
-"""Numbers from the equations of Dupont & Bapna (1994) with the paper's parameters, compared with ours.
+"""Numbers from the equations of Dupont & Bapna (1994) with the paper's parameters, compared with this package's.
 
-The paper itself prints only one such number. Ours come from the Model's critical stiffness, eigenvalues and
-boundaries, or from simulated motion; not from the closed forms of `steadyslip.paper`.
+The paper itself prints only one such number. Those of this package come from the Model's critical stiffness,
+eigenvalues and boundaries, or from simulated motion; not from the closed forms of `steadyslip.paper`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from steadyslip.units import deg
 
 @dataclass(frozen=True)
 class PaperNumber:
-    """Number from an equation or figure of the paper, with ours.
+    """Number from an equation or figure of the paper, with the number from this package.
 
     Attributes
     ----------

@@ -94,7 +94,7 @@ class Surroundings:
             ) from error
 
     def steady_motion(self, contact: ContactLaw, sigma: float, velocity: float | None = None) -> ContactInputs:
-        """Motion in steady sliding at normal stress `sigma` (Pa) and a velocity (m/s), by default that of the drive."""
+        """Motion in steady sliding at normal stress `sigma` (Pa) and `velocity` (m/s), by default the drive's."""
         v = self.velocity if velocity is None else velocity
         tau = float(self.friction.steady_strength(v, sigma))
         spring = tau + self.radiation_damping * v
@@ -110,7 +110,7 @@ class Surroundings:
 
         from scipy.optimize import brentq  # slow to import
 
-        closed = -1e-12  # separation in m, lowered until the stress is at least `sigma`: stress falls as surfaces part
+        closed = -1e-12  # m, separation, reduced until the stress is at least `sigma`: stress falls as surfaces part
         while excess_stress(closed) < 0:
             closed *= 10
             if closed < -1e12:
@@ -173,7 +173,7 @@ def check_contact_names(contact: ContactLaw, surroundings: Surroundings = DEFAUL
     require(
         (load is None) != (steady is None), contact, "load() and steady_stress(): give exactly one, None for the other"
     )
-    given = float(load if load is not None else steady)  # type: ignore[arg-type]  # one of them is given
+    given = float(load if load is not None else steady)  # type: ignore[arg-type]  # either load or steady is given
     unloaded = contact.is_compliant() and given == 0
     require(given > 0 or unloaded, contact, f"the load is {given!r} Pa, must be > 0 (compression is positive)")
 
@@ -278,7 +278,7 @@ def check_linearisation(contact: ContactLaw, surroundings: Surroundings = DEFAUL
             scale = (1e-7, place.velocity, place.velocity)[index]
             found, excess = disagreement(along, coefficient, (0, place.velocity, 0)[index], scale)
             with mpmath.workdps(DIGITS):
-                # floats, not fifty digits, in the coefficients: allow rounding of the terms
+                # the coefficients are floats, not numbers of fifty digits: rounding of their terms is allowed
                 allowed = TOLERANCE * (terms + sigma * 1e-6 / scale)
             require(
                 excess <= allowed,

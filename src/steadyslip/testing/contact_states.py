@@ -22,9 +22,9 @@ from steadyslip.testing.precise import (
     require_known_symbols,
 )
 
-FACTORS = (1.0, 0.01, 100.0)  # velocities at which states are checked, over that of the drive
+FACTORS = (1.0, 0.01, 100.0)  # velocities at which states are checked, as multiples of the drive's velocity
 STEP = 1e-6  # step of one-sided differences, relative to the natural scale of a variable
-SLOPE_TOLERANCE = 1e-4  # allowed error of derivatives over the largest: 100 steps, far below the jump at a kink
+SLOPE_TOLERANCE = 1e-4  # allowed error of derivatives over the largest one: 100 STEP, far below the jump at a kink
 
 
 def check_contact_states(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
@@ -116,7 +116,7 @@ def _checked_tuple(contact: ContactLaw, what: str, found: Any) -> tuple[sp.Expr,
 
 
 def _faster(motion: Any) -> Any:
-    """Motion with a velocity ten percent higher."""
+    """Copy of the motion with a velocity ten percent higher."""
     return replace(motion, velocity=1.1 * motion.velocity)
 
 

@@ -262,9 +262,9 @@ def check_numbers(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS)
                 )
 
 
-_VELOCITY_JUMP, _STRESS_JUMP = 3.0, 1.5  # ratio of values after and before: not small, within the range of most laws
-_RAMP_DURATION = 1e-3  # duration of the ramp relative to the fastest relaxation time
-_HALVING_RATIO = 0.6  # a change of first order halves with the duration; 0.1 is left for second order
+_VELOCITY_JUMP, _STRESS_JUMP = 3.0, 1.5  # ratio of values after and before a jump: not small, allowed by most laws
+_RAMP_DURATION = 1e-3  # duration of the ramp over the fastest relaxation time
+_HALVING_RATIO = 0.6  # limit of the ratio of changes: one of first order halves with the duration; 0.1 for second order
 
 
 def check_jumps(law: FrictionLaw, conditions: Conditions = DEFAULT_CONDITIONS) -> None:
@@ -330,7 +330,7 @@ def _strength_solver(symbolic: SymbolicLaw) -> Callable[..., float]:
                 strength, slope = (float(x) for x in function(v, sigma, *memory, tau))
             step = (strength - tau) / (1 - slope)
             tau += step
-            if not abs(step) > 1e-14 * abs(tau):  # NaN is returned too: the caller checks
+            if not abs(step) > 1e-14 * abs(tau):  # NaN is returned, too; the caller checks the result
                 return tau
         raise ContractViolation(
             f"{symbolic.law!r}: strength(v, σ, memory, tau) = tau cannot be solved at v = {v}, σ = {sigma}"

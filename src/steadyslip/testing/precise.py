@@ -133,7 +133,7 @@ def precise_function(
 
 
 def _precise(number: Any) -> mpmath.mpf:
-    """Number as mpf; an mpf is returned as it is, since copying one takes longer than most equations."""
+    """Number as mpf; an mpf is returned as it is, since copying it takes longer than evaluating most equations."""
     return number if type(number) is mpmath.mpf else mpmath.mpf(number)
 
 
@@ -154,7 +154,7 @@ def disagreement(
         wide = (values[1.0] - values[-1.0]) / (2 * step)
         narrow = (values[0.5] - values[-0.5]) / step
         size = max(abs(value) for value in values.values()) + abs(derivative * at) + terms
-        rounding = 10**6 * mpmath.eps * size / step  # a million: the terms inside may be larger than the value
+        rounding = 10**6 * mpmath.eps * size / step  # a million, as terms inside may be larger than the value
         wide_bend = abs(values[1.0] - 2 * middle + values[-1.0]) / step
         narrow_bend = abs(values[0.5] - 2 * middle + values[-0.5]) / (step / 2)
         error = abs(narrow - derivative) - abs(wide - narrow)

@@ -70,7 +70,7 @@ class SymbolicLaw(HasCache):
 
     @cached_property
     def steady_strength(self) -> sp.Expr:
-        """Steady strength τss(v, σ), Pa; evaluated late, as by default it needs the steady memory variables."""
+        """Steady strength τss(v, σ), Pa; evaluated on first use, as by default it needs the steady memory variables."""
         return call_with_symbols(self.law, "steady_strength", self._copy.steady_strength, self.v, self.sigma)
 
     @cached

@@ -46,7 +46,7 @@ class PoreFluid(PreloadedContact, name="pore-fluid"):
 
 
 def porous(stress: float) -> PoreFluid:
-    """Contact with pores at an effective stress (Pa), without dilatancy; its drainage rate is a placeholder."""
+    """Contact law with pores at an effective normal stress (Pa), without dilatancy; drainage is a placeholder."""
     return PoreFluid(
         steady_normal_stress=stress, suction=0.0, drainage=0.1,
         slip_distance=1e-5, v_ref=1e-6,

@@ -61,13 +61,13 @@ class ContactInputs:
 
     @property
     def slip(self) -> Expression:
-        """Former name of `lead`."""
+        """Earlier name of `lead`, kept for laws that use it."""
         warnings.warn("ContactInputs.slip is ContactInputs.lead now", DeprecationWarning, stacklevel=2)
         return self.lead
 
     @property
     def steady(self) -> ContactInputs:
-        """Values of all variables in steady sliding."""
+        """Copy in which all variables have their values in steady sliding."""
         return replace(
             self,
             lead=0,

@@ -98,7 +98,7 @@ class StribeckCurve(FrictionLaw):
 
 
 class CoulombStribeck(StribeckCurve, name="coulomb-stribeck"):
-    """Friction as a function of velocity only, of the present one or of the one a time lag ago.
+    """Friction as a function of velocity only: of the present velocity, or of the velocity a time lag ago.
 
     τ = σ[g(v) + σ2 v], g as in `StribeckCurve`. Without a memory there is no critical stiffness: where friction falls
     with velocity, the quasistatic problem is ill-posed, and with mass no stiffness stabilises.

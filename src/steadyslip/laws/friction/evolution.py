@@ -27,7 +27,7 @@ class Evolution(FrozenRecord, family="evolution law"):
     def scaled_rate(
         self, v: Expression, b_theta: Expression, b: Expression, d_c: Expression, v_ref: Expression
     ) -> Expression:
-        """Rate of bΘ (1/s) as a function of bΘ; override if it is defined for b = 0."""
+        """Rate of bΘ (1/s) as a function of bΘ; to be overridden if this rate is defined for b = 0."""
         return b * self.rate(v, b_theta / b, d_c, v_ref)
 
     def divides(self) -> bool:
@@ -35,7 +35,7 @@ class Evolution(FrozenRecord, family="evolution law"):
         return type(self).scaled_rate is Evolution.scaled_rate
 
     def offset(self, sigma: Expression, tau: Expression) -> Expression:
-        """Difference Ψ − bΘ as a function of the stresses: a part of the state that responds to them at once."""
+        """Difference Ψ − bΘ as a function of the stresses: the part of the memory that follows stresses at once."""
         return sp.Integer(0)
 
     def has_offset(self) -> bool:

@@ -44,7 +44,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     def strength(self, v: Expression, sigma: Expression, memory: Expressions, tau: Expression) -> Expression:
         """Friction stress τ (Pa).
 
-        `tau` is the friction stress itself, for laws whose state depends on it (Nagata); others ignore it.
+        `tau` is the friction stress itself, for laws whose state depends on it (Nagata); other laws ignore `tau`.
         """
         raise NotImplementedError
 
@@ -101,7 +101,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         return {}
 
     def forgets_stress(self) -> bool:
-        """True if the law has no memory of normal stress although others of its kind have."""
+        """True if the law has no memory of normal stress although other laws of its kind have such a memory."""
         return False
 
     def runs_away(self) -> bool:

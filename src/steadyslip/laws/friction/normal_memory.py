@@ -51,7 +51,7 @@ class NormalMemory(FrozenRecord, family="memory of normal stress"):
         return ()
 
     def steady_strength(self, sigma: Expression) -> Expression:
-        """Value of `strength` in steady sliding (Pa); override if a shorter expression exists."""
+        """Value of `strength` in steady sliding (Pa); to be overridden if a shorter expression exists."""
         return self.strength(sigma, self.steady_memory(sigma))
 
     def has_strength(self) -> bool:
@@ -61,7 +61,7 @@ class NormalMemory(FrozenRecord, family="memory of normal stress"):
     # shift of the state
 
     def offset(self, sigma: Expression) -> Expression:
-        """Difference Ψ − bΘ of memory variable and state, as a function of σ (Pa)."""
+        """Difference Ψ − bΘ between the memory variable and bΘ, as a function of σ (Pa)."""
         return sp.Integer(0)
 
     def parts(self, states: Sequence[State]) -> Expressions:
@@ -112,7 +112,7 @@ class LinkerDieterich(NormalMemory, name="linker-dieterich"):
     )
 
     def offset(self, sigma: Expression) -> Expression:
-        alpha = 1 if self.alpha is None else self.alpha  # None: `parts` are the states' own alpha
+        alpha = 1 if self.alpha is None else self.alpha  # if None, `parts` uses the alpha of each state
         return alpha * sp.log(sigma / self.sigma_ref)
 
     def parts(self, states: Sequence[State]) -> Expressions:

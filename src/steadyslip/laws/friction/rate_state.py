@@ -122,7 +122,7 @@ class RateState(FrictionLaw, name="rate-state"):
         return found
 
     def _one_state(self) -> dict[str, Any]:
-        """Values of the only or the first state, by name."""
+        """Parameters of the only state, or of the first of several states, by name."""
         one = self.states[0] if self.states else self
         if one.b is None or one.d_c is None:
             raise InternalError("b and d_c, or states, to be given")
@@ -169,12 +169,12 @@ class RateState(FrictionLaw, name="rate-state"):
         return tuple(s.b_cutoff_velocity for s in self.states) if self.states else (self.b_cutoff_velocity,)
 
     def _direct_factor(self, v: Expression) -> Expression:
-        """Factor of a in the coefficient: ln(v/v*), limited above the cut-off velocity v_a."""
+        """Factor of a in the friction coefficient: ln(v/v*), limited above the cut-off velocity v_a."""
         effect, cutoff = sp.log(v / self.v_ref), self.a_cutoff_velocity
         return effect if cutoff is None else effect - sp.log((v + cutoff) / (self.v_ref + cutoff))
 
     def _evolution_factor(self, theta: Expression, cutoff: Expression) -> Expression:
-        """Factor of b in the coefficient: Θ, or ln((v* + v_b e^Θ)/(v* + v_b)) with a cut-off velocity v_b."""
+        """Factor of b in the friction coefficient: Θ, or ln((v* + v_b e^Θ)/(v* + v_b)) with a cut-off velocity v_b."""
         return theta if cutoff is None else sp.log((self.v_ref + cutoff * sp.exp(theta)) / (self.v_ref + cutoff))
 
     def _all_states(self) -> tuple[tuple[Expression, Expression], ...]:
@@ -182,7 +182,7 @@ class RateState(FrictionLaw, name="rate-state"):
         return tuple((s.b, s.d_c) for s in self.states) if self.states else ((self.b, self.d_c),)
 
     def _has_offset(self) -> bool:
-        """True if the memory variables are Ψ = bΘ + offset, which is also valid for b = 0, rather than Θ."""
+        """True if the memory variables are not Θ but Ψ = bΘ + offset, which are also valid for b = 0."""
         return self.normal_memory.has_offset() or self.evolution.has_offset()
 
     def _offsets(self, sigma: Expression, tau: Expression) -> Expressions:
@@ -204,7 +204,7 @@ class RateState(FrictionLaw, name="rate-state"):
         return tuple(psi - off for psi, off in zip(memory, self._offsets(sigma, tau), strict=False))
 
     def _effects(self, sigma: Expression, memory: Expressions, tau: Expression) -> Iterator[Expression]:
-        """Yield the contribution of every state to the coefficient: b_iΘ_i, less with a cut-off velocity."""
+        """Yield the contribution of every state to the friction coefficient: b_iΘ_i, less with a cut-off velocity."""
         states = zip(self._all_states(), self._state_cutoffs(), strict=True)
         for ((b, _), cutoff), b_theta, stored in zip(
             states, self._b_theta(sigma, memory, tau), memory, strict=False

@@ -18,7 +18,7 @@ from steadyslip.linear.roots import Array, ComplexArray, evaluate, quietly
 
 UNKNOWN = -2  # count of roots where counting takes too long
 _MOST = 400_000  # most unresolved pieces of the axis, of all rigs together; more would take too much memory (by trial)
-_NEAR = 1e-13  # length of a piece over its frequency below which it is not cut further (rounding): a root lies on it
+_NEAR = 1e-13  # a piece shorter than this share of its frequency is not cut further: a root lies on it, to rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ def count_by_argument(c: Array, h: Array, sets: Sets) -> NDArray[np.int64]:
     end = bound_on_axis(c, sets)
     counted = np.flatnonzero(
         leads(c) | (end * np.max(h, axis=-1) < _MOST // len(c))
-    )  # other rigs would need too many pieces
+    )  # all other rigs would need more pieces of the axis than `_MOST`
     found = np.full(len(c), np.nan)
     c, h, end, top = c[counted], h[counted], end[counted], top[counted]
     axis = SumsOnAxis(c, h, sets)

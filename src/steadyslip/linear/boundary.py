@@ -102,17 +102,17 @@ def boundary(
     name : str
         Dotted name, or a unique last part, of any parameter that the rig has.
     between : (low, high), optional
-        Range to search, SI units or text such as ``"10 deg"``. By default the whole domain of angles and
-        shares, six decades to each side of other values and of their natural size, and both signs where they are
-        allowed. The edges in a range are the same whatever the range.
+        Range to search, SI units or text such as ``"10 deg"``. By default it is the whole domain of angles and shares;
+        for other parameters six decades to each side of the value and of its typical size, with both signs if they
+        are allowed. The range does not change the edges that are found inside it.
     branch : int
         Index of the steady state, by rising normal stress, if there are several.
 
     Returns
     -------
     tuple of Boundary
-        By rising value; empty if stability does not change in the range. A `linear.UndecidedWarning` names parts of
-        the range in which edges are not known, because roots under long delays are too many to be counted.
+        Edges by rising value; empty if stability does not change in the range. A `linear.UndecidedWarning` names
+        parts of the range in which edges are not known, as roots under long delays are too many to be counted.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def boundary(
         if limits is not None:
             operating_point(
                 rig, {full: np.asarray(limits)}, rig.kept_zeros(full), branch
-            )  # refuses what breaks a condition
+            )  # raises an error if an end of the range breaks a condition between parameters
     search = _search(rig, full, rig.kept_zeros(full), branch)
     found = search.boundaries(limits)
     if unknown := _unknown(rig, search, *(limits or search.searched)):

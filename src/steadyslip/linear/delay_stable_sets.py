@@ -111,7 +111,7 @@ def linear_windows(p: Array, q: Array, h: Array, low: float, high: float, sets: 
     theta = 10 ** (np.arange(np.floor(_STEPS * np.log10(low)), np.ceil(_STEPS * np.log10(high)) + 1) / _STEPS)
     low, high = float(theta[0]), float(theta[-1])
     edges = _edges_of_ill_posed(p, q, sets, spare, theta)
-    if len(h) <= 2:  # counts are quick, also next to these edges
+    if len(h) <= 2:  # with one delay, roots are counted quickly even next to the edges
         beside = edges[:, None] * np.concatenate([1 - _TOWARDS, 1 + _TOWARDS])
         theta = np.unique(np.append(theta, beside[(beside > low) & (beside < high)]))
     lost = _ill_posed(p, q, sets, spare, theta)

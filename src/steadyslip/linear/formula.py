@@ -202,7 +202,8 @@ def _in_time(work: Callable[[], sp.Expr], otherwise: sp.Expr) -> sp.Expr:
     thread = Thread(target=run, daemon=True)
     thread.start()
     thread.join(LONGEST)
-    for _ in range(10):  # SymPy is pure Python, so an exception can be raised in its thread; repeat if it is swallowed
+    # SymPy is pure Python, so an exception can be raised in its thread; SymPy may catch it, hence the repetition
+    for _ in range(10):
         if thread.is_alive() and thread.ident is not None:
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(_TooLong))
             thread.join(0.1)

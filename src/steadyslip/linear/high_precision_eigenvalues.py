@@ -36,7 +36,7 @@ def precise_eigenvalues(point: OperatingPoint, rough: ComplexArray) -> ComplexAr
     Parameters
     ----------
     point : OperatingPoint
-        Of a single rig.
+        Operating point of a single rig.
     rough : ndarray (n,) of complex
         Eigenvalues of another method, which give the number: with few digits some may look infinite here.
     """
@@ -59,7 +59,7 @@ def precise_root(point: OperatingPoint, near: complex) -> complex | None:
     Parameters
     ----------
     point : OperatingPoint
-        Of a single rig.
+        Operating point of a single rig.
     near : complex
         Start, 1/s.
     """

@@ -22,7 +22,7 @@ def require_matrices(machine: Machine) -> MachinePoint:
     Raises
     ------
     NotAvailable
-        If its numbers overflow, or steady sliding was not found.
+        If numbers of the machine overflow, or steady sliding was not found.
     """
     point = machine_point(machine)
     with np.errstate(all="ignore"):

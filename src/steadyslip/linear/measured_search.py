@@ -20,7 +20,7 @@ from steadyslip.model.numeric.measured import MeasuredMachine, measured_machine
 # Roots are counted at 10 values per decade, two decades to each side; in a bounded domain at 61 evenly spaced values.
 _DECADES, _PER_DECADE, _EVEN = 2, 10, 61
 _HALVINGS = 14  # most halvings of the interval between two values: to about 1e-5 of the values
-_SHARE = 0.02  # precision of the ends of an undecided range, over its width: errors are hardly known better
+_SHARE = 0.02  # precision of the ends of an undecided range, as share of its width; errors are hardly known better
 _NEWTON = 30  # most steps of Newton's method; from a bracket of 1e-5 a few do
 _STEP = 1e-7  # relative step of differences: about the square root of the rounding error
 _LAST = 1e-12  # relative step at which Newton's method has ended
@@ -69,7 +69,7 @@ class MeasuredSearch:
     def _status(self, value: float) -> int:
         try:
             growing = self._at(value).count.growing
-        except NotAvailable:  # a law without steady stress there
+        except NotAvailable:  # the laws have no steady stress at this value
             return UNKNOWN
         return UNKNOWN if growing is None else UNSTABLE if growing else STABLE
 

@@ -48,10 +48,10 @@ class ModeChart(Displayed):
     values : ndarray (p,)
         Values of the parameter (SI), rising; closer together where eigenvalues change quickly.
     eigenvalues : ndarray (p, n), complex
-        1/s, with β > 0: one column for each oscillation, NaN where it does not oscillate or steady sliding is absent.
+        Eigenvalues (1/s) with β > 0: one column for each oscillation, NaN where it does not exist.
     numbers : tuple of int
-        For each column its `Mode.number`, the place by rising frequency, in the machine as it is, or at the nearest end
-        of the range; 0 for oscillations that exist at other values only.
+        `Mode.number` of the oscillation in each column: its place by rising frequency in the machine as it is, or at
+        the nearest end of the range; 0 for oscillations that exist only at other values of the parameter.
     edges : tuple of Boundary
         Values at which stability changes.
     origins : tuple of Origin
@@ -183,8 +183,8 @@ def mode_chart(rig: Slider | Machine, name: str, between: Sequence[Any] | None =
     Raises
     ------
     UnknownNameError, ParameterError
-        If the name is unknown, or the range is not inside the parameter's domain; without `between` also if the own
-        value is zero.
+        If the name is unknown, or the range is not inside the parameter's domain; without `between` also if the
+        parameter is zero in the machine.
     NotAvailable
         For a slider, and if nothing oscillates in the range.
 

@@ -40,7 +40,7 @@ _MOST = 4.0  # largest multiple of the machine's friction up to which a meeting 
 _ROUNDS, _LAST = 60, 4 * np.finfo(float).eps  # regula falsi: most steps, and relative size of the last step
 _SAME = 1e-6  # relative difference of frequencies that counts as rounding of a double root
 _ALIKE = 0.5  # other contacts are counted if they feed at least this share of what the largest contact feeds
-_NEAR = 0.25  # largest relative difference of frequency between a mode and the undamped pair identified with it
+_NEAR = 0.25  # largest relative difference between the frequency of a growing mode and that at which two modes meet
 
 
 @dataclass(frozen=True)

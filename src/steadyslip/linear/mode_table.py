@@ -172,11 +172,11 @@ def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
     Raises
     ------
     NoSteadySliding
-        Naming the contact that locks up or lifts off.
+        If a contact locks up or lifts off; the message names it.
     ParameterError
         If there is no oscillation with this number.
     NotAvailable
-        Of a slider.
+        For a slider.
 
     Examples
     --------

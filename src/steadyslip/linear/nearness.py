@@ -21,7 +21,7 @@ def doublings(value: ArrayLike, other: ArrayLike, unit: str = "") -> Any:
     Parameters
     ----------
     value, other : array_like
-        In one unit; they broadcast.
+        Values in the same unit; they broadcast.
     unit : str
         SI unit of the parameter; only ``rad`` matters.
 
@@ -55,7 +55,7 @@ def nearest_end(ends: Array, own: ArrayLike, unit: str = "") -> Array:
     Parameters
     ----------
     ends : ndarray (..., m)
-        In any order; padded with NaN.
+        Ends in any order, padded with NaN.
     own : array_like (...)
     unit : str
 

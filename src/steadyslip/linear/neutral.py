@@ -21,9 +21,9 @@ from steadyslip.linear.roots import Array, ComplexArray, quietly
 Sets = NDArray[np.bool_]
 """Table (m, d): True where term j is delayed by delay i."""
 _SWEEPS = 30  # rounds over all delays; by trial: the smallest value found changes by less than 1e-6 in the last
-_STARTS = 24  # random starts of the minimisation of |P|, beside all combinations of phases 0 and π, where P is real
+_STARTS = 24  # number of random starts of the minimisation of |P|; further starts are all phases of 0 and π (P real)
 _SETTLED = 1e-9  # relative change of the minimum in one round below which it has converged
-_SURE = 0.5  # share of the smallest value found that is used as lower bound: another start might find a smaller one
+_SURE = 0.5  # the lower bound is this share of the smallest value found, as further starts might find a smaller value
 _STEPS = 257  # points between 0 and x at which the argument of P is followed
 
 

@@ -32,7 +32,8 @@ GOOD = 1e-6
 """Largest accepted relative error of an eigenvalue; with a larger error it is computed again with many digits."""
 _NOISE = np.finfo(float).eps
 _LAST = 8 * _NOISE  # relative rounding error after a few operations on the machine's parameters
-_BESIDE = 1 + 64 * _NOISE  # factor on an eigenvalue: dM/ds is taken slightly beside it, for double eigenvalues
+# factor on an eigenvalue before dM/ds is taken: exactly at a double eigenvalue its effect is zero
+_BESIDE = 1 + 64 * _NOISE
 _FIRST = 2.0  # safety factor on errors to first order, for the effect of nearby eigenvalues
 _TRIALS = 4  # number of copies with perturbed last digits of parameters; exp(−(v/v_s)²), for example, amplifies these
 _ALIKE = 100.0  # singular values up to this multiple of the least one count as zero too
@@ -82,7 +83,7 @@ def checked_spectrum(point: OperatingPoint) -> CheckedSpectrum:
     Parameters
     ----------
     point : OperatingPoint
-        Of a single rig: ``point.shape`` is ().
+        Operating point of a single rig: ``point.shape`` is ().
 
     Returns
     -------

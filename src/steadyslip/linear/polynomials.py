@@ -16,7 +16,7 @@ from steadyslip.linear.roots import Array, ComplexArray, degrees, quietly, roots
 
 _NEARLY_REAL = 1e-6  # relative imaginary part up to which a root in β² counts as real
 _FAR = 1e75  # size of a coefficient beyond which products of four may leave the range of floating point
-_SAME = 1e-9  # relative distance below which two boundaries in k are one
+_SAME = 1e-9  # relative distance below which two boundaries in k count as the same
 
 
 @quietly

@@ -26,7 +26,7 @@ from steadyslip.linear.neutral import Sets, bound_on_axis, can_vanish
 from steadyslip.linear.polynomials import even_odd, product
 from steadyslip.linear.roots import Array, evaluate, quietly, roots
 
-INFINITE = 2**62  # a count of roots, larger than any other
+INFINITE = 2**62  # stands for infinitely many roots: larger than any number of roots
 _BATCH = 40  # number of rigs with several delays whose roots are counted together; by trial: memory against speed
 # delays at which roots cross are listed up to this many periods of the highest frequency; by trial
 _MOST_PERIODS = 5000

@@ -175,7 +175,7 @@ def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
     Parameters
     ----------
     rig : Slider
-        With one memory variable and without integral control.
+        Slider with one memory variable and without integral control.
     vary : mapping of str to array_like or xarray.DataArray, optional
         Parameters to vary by dotted name, in SI units.
 

@@ -46,10 +46,10 @@ from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.sliding import explain_absence
 
 _ROUNDING = 64  # smallest distance, in units in the last place, within which two edges are merged
-_WIDER = 6  # number of distances tried, each 8 times the one before: up to 1e-10 of the value, negligible for users
+_WIDER = 6  # number of distances tried, which grow by a factor of 8: up to 1e-10 of the value, which is negligible
 _BESIDE = 4  # a kind is the status plus multiples of this; kind % _BESIDE is the status
 # Limits of the scan, chosen by trial: computing time against edges missed where several lie close together.
-_FLAT = 1e-6  # relative depth of a minimum of a measure below which it is rounding error of a constant
+_FLAT = 1e-6  # relative depth of a minimum up to which the minimum is rounding error of a constant
 _DIPS = 16  # most minima of the damping that are examined, deepest first; rounding may cause one at every sample
 _ROUNDS = 8  # most rounds of narrowing; where several edges lie between two samples, each round finds one more
 _CHANGES = 64  # if kinds change more often, only changes of status are narrowed; the other changes are due to rounding

@@ -51,7 +51,7 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
     -----
     With a delay, roots are counted; no rational function replaces it. Stable values of a delay itself are all found.
     Other parameters of a rig with delay may have infinitely many intervals; these are searched up to a factor of a
-    million from the own value, and as long as no oscillation has more than a hundred periods during the delay. The last
+    million from the value in the rig, if no oscillation has more than a hundred periods during the delay. The last
     interval ends there, and `boundary` issues a warning.
 
     Examples

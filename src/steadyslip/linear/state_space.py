@@ -92,7 +92,7 @@ def _require_eigenvalues(point: OperatingPoint, a: Array) -> None:
     Raises
     ------
     NotAvailable
-        Naming the largest stiffness.
+        If eigenvalues are lost; the message names the largest stiffness.
     """
     right = checked_spectrum(point)
     own = np.linalg.eigvals(a)

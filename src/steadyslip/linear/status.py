@@ -116,7 +116,7 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
     That is so at an edge, and if terms cancel that are many orders of magnitude larger than their sum. It is not so if
     another disturbance grows in any case.
     """
-    if np.any(digits_lost(point)):  # its eigenvalues are computed with many digits, which arrays do not allow
+    if np.any(digits_lost(point)):  # eigenvalues need many digits, with which arrays of copies are not computed
         return False
     chance = np.random.default_rng(0)
     arguments = [
@@ -169,7 +169,7 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
         edge = np.array(np.broadcast_to(undamped | neutral, point.shape))
         if point.single or len(point.shape) != 1:
             return edge & ~outgrown(point, neutral, ON_THE_EDGE) if np.any(edge) else edge
-        rows = np.flatnonzero(edge)  # outgrown takes long with a delay, so only for these rigs
+        rows = np.flatnonzero(edge)  # `outgrown` is called for these rigs only, as it takes long with a delay
         if rows.size:
             edge[rows] = ~outgrown(point.part(rows), np.broadcast_to(neutral, point.shape)[rows], ON_THE_EDGE)
         return edge

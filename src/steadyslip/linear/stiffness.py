@@ -171,7 +171,7 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     found = in_chunks(point, kernel)
     if point.model.delays and np.any(lost := np.all(np.isnan(found), axis=-1)):
         if point.single:
-            unstable_roots(point)  # refused where it cannot be counted
+            unstable_roots(point)  # raises NotAvailable if roots cannot be counted
         _warn_of_delays(int(np.count_nonzero(lost & is_ill_posed(point) & point.exists)), point.size)
     if count := int(np.count_nonzero(among_many(point, found))):
         which = f"of {count} of {point.size} rigs some" if point.size > 1 else "some"

@@ -19,13 +19,13 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.model.numeric import has_response
 from steadyslip.model.numeric.pencil import ComplexArray
 
-_PROMINENT = 0.5  # least rise of ln|response| at a peak above its surroundings; noise of 10 % stays below
-_DAMPED = 0.01  # damping ratio of starting poles; vector fitting moves them
-_BESIDE = 1.2  # frequency over the end of the band at which a mode beyond it is tried
+_PROMINENT = 0.5  # least height of a peak in ln|response| above its surroundings; noise of 10 % makes lower peaks
+_DAMPED = 0.01  # damping ratio of the poles with which vector fitting starts
+_BESIDE = 1.2  # frequency, over the last of the band, at which a mode beyond the band is tried
 _NOTHING = 1e-9  # share of the largest response below which a response counts as rounding error
 _SMOOTHED = 9  # number of neighbouring frequencies over which squared residuals are averaged to place a new mode
 _EVALUATIONS = 40  # most evaluations in least squares; from poles of vector fitting some five suffice
-_EXACT = 1e-22  # mean square misfit relative to the response below which it is rounding error
+_EXACT = 1e-22  # mean square misfit, relative to the response, that is only rounding error
 _SURE = 4.0  # least damping of a mode over its standard error; a mode with less is a fit to noise of the response
 _MOST_MODES = 40  # largest number of modes; bounds the time, as each further mode takes two fits of all modes
 _MOST_ENTRIES = 30_000_000  # most entries of the table of derivatives: 240 MB
@@ -98,7 +98,7 @@ def identified_modes(machine: Machine) -> IdentifiedModes:
     Raises
     ------
     NotAvailable
-        If there is no such structure, or no sum of modes describes the response.
+        If the machine has no measured response, or no sum of modes describes the response.
 
     Notes
     -----
@@ -194,7 +194,8 @@ class _Known:
         """Responses and weights of measured data; data without errors get errors proportional to each response."""
         response, deviation = data.full
         error, has_errors = deviation / math.sqrt(2), bool(np.any(deviation))
-        if not has_errors:  # proportional to the response, or to the geometric mean of the direct ones if larger
+        # errors proportional to the response, or to the geometric mean of driving-point responses if that is larger
+        if not has_errors:
             own = np.sqrt(np.abs(np.diagonal(response, axis1=1, axis2=2)))
             error = np.maximum(np.abs(response), np.nan_to_num(own[:, :, None] * own[:, None, :]))
         use = np.isfinite(response) & (error > 0)

@@ -43,7 +43,7 @@ def transport(order: int) -> Transport:
     from scipy.linalg import schur  # slow to import
 
     k = np.arange(order)
-    size = np.sqrt(2.0 * k + 1.0)  # values of the polynomials at the end; at the beginning they alternate
+    size = np.sqrt(2.0 * k + 1.0)  # values of the polynomials at θ = 1; at θ = 0 their signs alternate
     ahead = k[None, :] >= k[:, None]
     matrix = -np.outer(size, size) * np.where(ahead, 1.0, (-1.0) ** (k[:, None] - k[None, :]))
     upper, turned = schur(matrix, output="real")

@@ -81,7 +81,7 @@ def determinant(
     -------
     names : list of sympy.Symbol
     parts : dict
-        By exponents of s and delays: the coefficient as list of (exponents of `names`, integer).
+        Coefficients by exponents of s and delays; each is a list of (exponents of `names`, integer).
 
     Raises
     ------

@@ -302,7 +302,7 @@ def _eigenvalues(point: OperatingPoint, late: Delays) -> tuple[NDArray[np.comple
         return np.where(good[..., None], found, np.nan), sizes
     flat = [block.reshape(good.size, *block.shape[-2:]) for block in blocks]
     rows = [_single_rig(point.model, [block[i] for block in flat]) if ok else None for i, ok in enumerate(good.ravel())]
-    width = max((len(row[0]) for row in rows if row is not None), default=1)  # at least one column, of NaN
+    width = max((len(row[0]) for row in rows if row is not None), default=1)  # at least 1, for a column of NaN
     table, moved = np.full((len(rows), width), np.nan, dtype=complex), np.full((len(rows), width), np.nan)
     for i, row in enumerate(rows):
         if row is not None and len(row[0]) == width:

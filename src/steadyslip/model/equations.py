@@ -243,8 +243,8 @@ class Model(HasCache, Displayed):
     late_signals : tuple of LateSignal
         Delayed signals of a Model for motion; see `steadyslip.model.dead_time`.
     for_motion : callable or None
-        With delays: function that builds the Model for motion, without delays, from the number of variables of each
-        late signal (`steadyslip.model.dead_time`). It has the same parameters.
+        For a Model with delays, the function that builds the Model for motion, which has none, from the number of
+        variables of each late signal (`steadyslip.model.dead_time`). Both have the same parameters.
     letting_go : LettingGo or None
         Expressions for a drive that is alternately moved and released; None for other drives.
     carried : Carried or None

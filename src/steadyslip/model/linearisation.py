@@ -46,9 +46,9 @@ class Linearisation:
     columns : tuple of sympy.Symbol
         Displacements, velocities, memory variables, integral, unknown friction stresses, kept stresses.
     rows : dict
-        For each column the gradient of its rate with respect to columns, accelerations, delayed symbols and inputs;
-        for a velocity the gradient of the balance of forces, for a friction stress of its law minus the stress, for a
-        kept stress of its definition minus the stress.
+        Gradients with respect to columns, accelerations, delayed symbols and inputs, one for each column: for a
+        variable the gradient of its rate; for a velocity, of the balance of forces; for a friction stress, of its law
+        minus the stress; for a kept stress, of its definition minus the stress.
     outputs : dict
         Gradients of the observables.
     """

@@ -160,7 +160,7 @@ def require_range(point: OperatingPoint) -> None:
     Raises
     ------
     NotAvailable
-        Naming the parameters that cause it, if they can be found.
+        If the numbers leave the range; the message names the parameters that cause this, if they can be found.
     """
     if not in_range(point):
         raise out_of_range_error(point)
@@ -172,7 +172,7 @@ def require_digits(point: OperatingPoint) -> None:
     Raises
     ------
     NotAvailable
-        Naming the largest stiffness.
+        If eigenvalues are lost; the message names the largest stiffness.
     """
     if np.any(digits_lost(point)):
         raise NotAvailable(f"in double precision no edge of this rig can be searched: {hidden_by_stiffest(point)}")

@@ -130,7 +130,7 @@ class _Reducer:
     # -- assignment of equations
 
     def _force_balance(self, coordinate: Coordinate) -> sp.Expr:
-        if coordinate.balance is None:  # slider: its contact has the only balance
+        if coordinate.balance is None:  # the only balance of a slider is that of its contact
             return self.balances[0]
         return self._variables(coordinate.balance, None)
 
@@ -429,7 +429,7 @@ def _inputs(
     behind = max(len(pushes) - 1, 0)
     acting = dict(zip(pushes, (first_push, *more[:behind]), strict=False))
     pressing = dict(zip(presses, (first_press, *more[behind:]), strict=False))
-    if model.is_single:  # names may be left out, and one kernel serves all protocols
+    if model.is_single:  # names of body and contact may be left out, and one kernel serves all protocols
         acting = {name or model.coordinates[0].name: s for name, s in (acting or {"": first_push}).items()}
         pressing = pressing or {model.contacts[0].name: first_press}
     if LOAD_POINT in acting:

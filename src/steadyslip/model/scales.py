@@ -158,7 +158,7 @@ def machine_scales(
         scales[f"{one.name}.x"] = x
         scales[f"{one.name}.v"] = choose(abs(own[k]) > 0, abs(own[k]), x / time)
     for contact, stress, direct in zip(model.contacts, stresses, directs, strict=True):
-        # states of contact laws are pressures: they change friction by about their own size
+        # states of contact laws are pressures: friction changes by about as much as they do
         scales |= {item.name: choose(direct > 0, direct, abs(stress)) for item in contact.own_states}
     for (found, _), contact in zip(each, model.contacts, strict=True):
         scales |= {item.name: found[item.name] for item in contact.memory} | {f"{contact.name}.{SPEED}": found[SPEED]}

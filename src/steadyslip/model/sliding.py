@@ -49,7 +49,7 @@ def steady_state(rig: Slider | Machine) -> SteadySliding | SteadyMachine:
     Raises
     ------
     NoSteadySliding
-        With the condition that fails (lock-up, lift-off) and its shortfall.
+        If steady sliding does not exist; the error has the condition that fails (lock-up, lift-off) and its shortfall.
     NotAvailable
         If numbers leave the range of floating point.
 
@@ -68,7 +68,7 @@ def steady_machine(rig: Machine) -> SteadyMachine:
     Raises
     ------
     NoSteadySliding
-        Naming the contact that locks up or lifts off.
+        If a contact locks up or lifts off; the message names it.
     """
     if by_matrices(rig):
         return steady_of(measured_machine(rig) if has_response(rig) else machine_point(rig))
@@ -108,7 +108,7 @@ def steady_states(rig: Slider | Machine) -> tuple[SteadySliding, ...] | tuple[St
     Raises
     ------
     NoSteadySliding
-        If there is none.
+        If there is no steady sliding.
     NotAvailable
         If numbers leave the range of floating point.
 
@@ -221,7 +221,7 @@ def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySlid
     """Error for contacts with coupled steady normal stresses."""
     contacts = point.model.contacts
     sigma, gain = joint.solve(point.arguments)
-    least = int(np.argmin(sigma))  # just beyond lock-up: the contact that the others press most
+    least = int(np.argmin(sigma))  # just beyond lock-up, this is the contact that other contacts press most
     name = contacts[least].name
     if not gain < 1:
         words = ABSENT["together"].format(at=_at(name), margin=f"{1 - gain:.4g}")

@@ -27,7 +27,8 @@ ROOT_TOLERANCE = 1e-6  # residual relative to the stress; above it a change of s
 _NEARLY_REAL = 1e-9  # largest relative imaginary part of an eigenvalue that counts as real; chosen by trial
 _BATCH = 64  # number of rigs whose roots are searched together, so that arrays stay in the processor's cache
 MAX_BENDS = 8  # most absolute values |e| in coupled equations; each |e| doubles the number of linear systems to solve
-_HALVINGS = 48  # bisection steps: a cell of `GRID` is 0.012 of its stress wide, and 0.012 / 2**48 is below rounding
+# number of bisections: a cell of `GRID` has a relative width of 0.012, and 0.012 / 2**48 is below rounding
+_HALVINGS = 48
 
 
 @dataclass(frozen=True)

@@ -49,8 +49,8 @@ class System:
     function : ArrayFunction
         Array function of the expressions.
     late : tuple of (int, int, int)
-        For each late unknown, the value of another unknown one delay ago: its own index (also that of its equation),
-        index of the other unknown, and index of the delay in `Model.delays`.
+        Three indices for each late unknown, which is the value of another unknown one delay ago: of the late unknown
+        (and its equation), of the other unknown, and of the delay in `Model.delays`.
     """
 
     model: Model

@@ -17,7 +17,7 @@ from steadyslip.model.kinematics import kinematics
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reducing import can_eliminate
 
-LEAST_WEIGHT = 1e-5  # least effect on friction, relative to that of ln v, of a memory variable that is eliminated;
+LEAST_WEIGHT = 1e-5  # least effect of an eliminated memory variable on friction, relative to the effect of ln v;
 # elimination amplifies rounding by the inverse, here 1e5; chosen by trial
 
 

@@ -14,7 +14,7 @@ from steadyslip.model.numeric.machine_matrices import MachineMatrices, Site
 
 _STEPS = 60  # most steps of Newton's method; two suffice if laws are linear in the stresses
 _CONVERGED = 1e-13  # relative change of the stresses at which Newton's method has converged: some hundred roundings
-_STALLED = 1e-6  # a smaller relative change counts as rounding if it no longer falls: stresses far below the forces
+_STALLED = 1e-6  # a relative change up to this size that no longer falls is rounding (stresses far below the forces)
 _SHRINK = 0.1  # a step reduces a stress at most to this share of its value
 _LARGE = 64  # number of unknowns above which solving systems of equations one by one is faster than all together
 _FREE = 1e-13  # relative size of a pivot of the balances below which nothing holds some body in its place

@@ -25,7 +25,7 @@ _PER_DECADE = 24  # number of frequencies per decade, besides those near poles
 _BEYOND = 1e3  # factor beyond the slowest and fastest root up to which frequencies are as dense
 _FAR = 1e12  # factor up to which frequencies are followed: a changed machine may be that much slower or faster
 _SPARSE = 6  # number of frequencies per decade from `_BEYOND` to `_FAR`
-_TURN = 1.2  # rad; between two frequencies the argument may change by this much; if by more, one is added between
+_TURN = 1.2  # rad; largest change of the argument between two frequencies; for a larger change, one is added between
 _ROUNDS = 24  # most halvings of the interval between two frequencies until the argument changes little enough
 # If halving leads to more than 4 times as many intervals with large changes of the argument as at first (or as 64),
 # the changes are due to rounding.
@@ -83,7 +83,8 @@ class LowRankChange:
         if response.shape[1] > response.shape[2]:  # det(1 + R B) = det(1 + Rᵀ Bᵀ); the smaller matrix is used
             response, core = np.swapaxes(response, 1, 2), (core[0].T, core[1].T)
         flat, size = response.reshape(-1, response.shape[2]), response.shape[1]
-        by_rate, by_place = ((flat @ one).reshape(-1, size, size) for one in core)  # faster than one by one
+        # all frequencies at once, which is faster
+        by_rate, by_place = ((flat @ one).reshape(-1, size, size) for one in core)
         found: ComplexArray = np.linalg.det(np.eye(size) + 1j * omega[:, None, None] * by_rate - by_place)
         return found
 

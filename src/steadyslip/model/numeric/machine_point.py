@@ -136,7 +136,7 @@ def machine_point(machine: Machine) -> MachinePoint:
     Raises
     ------
     NotAvailable
-        If it has a structure given by its measured response.
+        If the machine has a structure given by its measured response.
     """
     refuse_response(machine)
     found: MachinePoint = _point(machine)
@@ -166,7 +166,7 @@ def steady_of(point: MachinePoint | MeasuredMachine) -> SteadyMachine:
     Raises
     ------
     NoSteadySliding
-        Naming the contact that locks up or lifts off.
+        If a contact locks up or lifts off; the message names it.
     NotAvailable
         If steady sliding was not found.
     """

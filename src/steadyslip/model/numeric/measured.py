@@ -33,12 +33,12 @@ from steadyslip.model.numeric.sampled_response import (
     product,
 )
 
-_SURE = 4.0  # errors up to this many standard deviations are allowed for; of complex errors one in e^16 is larger
+_SURE = 4.0  # number of standard deviations up to which errors are allowed for; one complex error in e^16 is larger
 _TURN = 1.2  # rad; largest change of the argument between two samples; if it is larger, a sample is added between
 # largest second difference of the determinant over its size; linear interpolation is off by an eighth of it
 _BENT = 0.5
 _ROUNDS = 12  # most halvings of the interval between two samples
-_ROUNDING = 1e-9  # real part of a friction's derivative over its size, below which it is rounding error
+_ROUNDING = 1e-9  # relative real part of a derivative of friction, below which the real part is rounding error
 _PUSHED = 0.5  # largest share, in the highest octave, of the determinant due to friction that follows the normal force
 _PASSIVE = 2.6  # rad; largest angle of an eigenvalue at the end of the band, clearly below π, so that it is unambiguous
 _WHOLE = 0.25  # largest difference of the number of half turns from a whole number
@@ -142,7 +142,8 @@ class MeasuredMachine:
         self.balance = self.contacts.balance
         rows = np.array([row for one in self.matrices.sites for row in (one.slip, one.apart)])
         used = np.any(rows != 0, axis=0)
-        self._both = np.kron(rows[:, used], rows[:, used])  # from products of directions to those of contacts
+        # converts receptances in measured directions to receptances at contacts
+        self._both = np.kron(rows[:, used], rows[:, used])
         same = like is not None and np.array_equal(used, like.used)
         self.rows: Array = rows
         self.used: NDArray[np.bool_] = used

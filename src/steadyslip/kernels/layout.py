@@ -53,10 +53,10 @@ class Row(IntEnum):
     EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 39, 40, 41, 42, 43, 44
     EVENT_RINGS, EVENT_RING_FREQUENCY, LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 45, 46, 47, 48, 49
     # size of the last velocity peak; load point's displacement; largest stress drop; begin of the last event in each
-    # direction; then of the last event: T and slip at its begin, begin of its last ring
+    # direction; then T and slip at the begin of the last event, and the begin of the last ring after it
     PEAK_SIZE, LOAD_MOVED, LARGEST_DROP, FORWARD_BEGIN, BACKWARD_BEGIN = 50, 51, 52, 53, 54
     EVENT_STRESS, EVENT_X, LAST_RING = 55, 56, 57
-    # slip in progress: lowest speed, 1 if fast, highest speed, begin, sign; then the state at its lowest speed
+    # slip in progress: lowest speed, 1 if fast, highest speed, begin, sign; then the state when the speed was lowest
     NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN, NOW_SIGN = 58, 59, 60, 61, 62
     NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 63, 64, 65, 66, 67, 68
     # end of the last fast forward slip; number and last stress drop of similar small slips after rests (`ALIKE`)

@@ -252,7 +252,7 @@ class Step(Evaluator):
                     place = layout.event_count + kind
                     store(place, load(place) + select(own, 1.0, 0.0))
             store(layout.event_value + e, select(known, value, before))
-            if e % len(EVENTS) not in tuple(EventPlace):  # without a log these events are only counted
+            if e % len(EVENTS) not in tuple(EventPlace):  # events that are only counted if no log is kept
                 change = select(load(Row.LOG) > 0.0, change, 0.0)
             count = count + abs(change)
         happened = count * load(Row.ACTIVE)

@@ -12,7 +12,7 @@ from steadyslip.kernels.layout import Layout, Routines, call
 FIRST_REACH = 0.01
 ROUNDS = 300  # most sweeps over coupled balances; chosen by trial
 MOST_TRIALS = 200  # most steps to find a bracket, which doubling widens to 1e58 scales, and most steps inside it
-SETTLED = 1e-14  # relative change of the unknowns in a sweep below which it has converged: some tens of roundings
+SETTLED = 1e-14  # relative change of the unknowns in a sweep below which sweeps have converged: some tens of roundings
 # most steps of Newton's method for all balances; steps at least halve, so that 37 lead from 1 to ROUNDED
 NEWTON_STEPS = 50
 ROUNDED = 1e-11  # relative change of the unknowns below which Newton's method has converged: rounding of the balances

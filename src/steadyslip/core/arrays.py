@@ -34,7 +34,7 @@ def checked_array(name: str, role: Parameter, value: Any) -> Any:
     Raises
     ------
     ParameterError
-        Naming the parameter, the first bad value and its position.
+        If a value is not allowed; the message has the parameter, the first such value and its position.
     """
     if hasattr(value, "dims"):
         return value.copy(data=np.asarray(checked_array(name, role, value.values)))
@@ -72,7 +72,7 @@ def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any])
     Raises
     ------
     ParameterError
-        Naming the parameter, the first bad value and its position.
+        If a condition fails; the message has the parameter, the first value that breaks it, and its position.
     """
     found = conditions(with_values(record, varied, prefix), prefix)
     problems = [p for name, condition in found if (p := condition.problem(name)) is not None]

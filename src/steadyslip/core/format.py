@@ -35,7 +35,7 @@ def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
     """
     found = {kind: set(several) for kind, several in _by_dimension(names).items()}
     loads = {name.partition(" at ")[2] for name in names if " at " in name}
-    for kind, si in _PER_LOAD.items():  # if one parameter is printed at a load, all friction per load is
+    for kind, si in _PER_LOAD.items():  # if one parameter is printed at a load, all parameters per load are
         if loads and not any(" at " in name for name in found.get(kind, ())):
             of_forces = found.get(unit(si)[1]) or {si}
             found[kind] = {f"{one} at {load}" for load in loads for one in of_forces}
@@ -111,7 +111,8 @@ def _best(value: float, names: tuple[str, ...]) -> str | None:
     return min(names, key=lambda name: abs(math.log10(abs(value) / unit(name)[0]) - 1), default=None) if value else None
 
 
-_SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # takes a prefix; not m^2 (it would scale m), nor s/m (ms/m misleads)
+# units that take a prefix; not m^2 (the prefix would apply to m), nor s/m (ms/m misleads)
+_SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")
 _SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 HIDDEN = 1e-3  # a value smaller than this share of its error is printed as 0, as none of its digits is known
 MOST_DIGITS = 12  # largest number of digits with which the ends of a narrow range are printed; more are rounding errors

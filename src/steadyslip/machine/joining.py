@@ -34,8 +34,8 @@ def joined(machine: Machine, *links: str) -> Machine:
     Returns
     -------
     Machine
-        The joint body has the name of the link's first end, unless the drive acts on the second body, or only the
-        second can take over the contacts of both.
+        Copy of the machine. The joint body has the name of the link's first end, unless the drive acts on the second
+        body, or only the second can take over the contacts of both.
 
     Raises
     ------

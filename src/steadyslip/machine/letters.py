@@ -70,7 +70,8 @@ def words_of(rig: Rig, name: str) -> str:
     """
     part, *between, last = name.split(".")
     base, role, own = last.partition("_")[0], rig.parameters()[name].role, part in MEMBERS
-    words = _BY_NAME.get(last, "") if role.letter else ""  # no letter: a user's own parameter of that name
+    # a parameter without letter is declared by a user, and only has the same name
+    words = _BY_NAME.get(last, "") if role.letter else ""
     if not words and (len(base) == 1 or base in _GREEK):
         words = _BY_KIND.get(role.kind, "reference velocity" if last == "v_ref" else "" if own else part)
     elif part == "drive":

@@ -32,7 +32,7 @@ class LawsOfContact(NamedTuple):
 class Rig(FrozenRecord, HasCache):
     """Base of `Slider` and `Machine`: a frozen record with parameters by dotted name and a mechanism."""
 
-    if TYPE_CHECKING:  # fields in one subclass, class constants in the other
+    if TYPE_CHECKING:  # these are fields in one of the two subclasses and class constants in the other
 
         @property
         def area(self) -> float | None: ...

@@ -251,7 +251,7 @@ def reduced(structure: StructureData, kept: Sequence[int | str], modes: int) -> 
     Returns
     -------
     reduced : StructureData
-        Its first degrees of freedom are those `kept`, in their order.
+        Reduced structure; its first degrees of freedom are those in `kept`, in the same order.
     error : float
         Largest relative error of the structure's natural frequencies up to half that of the last mode added; without
         added modes, of the lowest frequency.

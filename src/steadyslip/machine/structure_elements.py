@@ -165,7 +165,7 @@ def _chain(even: Array, first: list[Array]) -> Array:
     waiting = [*first]
     for place in range(len(even)):
         axes = _with_axis(axes, waiting, even)
-        if len(axes) <= place:  # the axes span all that forces reach: complete them by any orthogonal ones
+        if len(axes) <= place:  # the axes span all motions that forces excite; any orthogonal axes complete them
             rest = np.linalg.svd(axes)[2][len(axes) :] if len(axes) else np.eye(len(even))
             waiting = [*rest]
             axes = _with_axis(axes, waiting, even)

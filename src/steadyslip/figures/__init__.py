@@ -92,7 +92,7 @@ def _locus(found: Analysis, ax: Axes | None = None, stiffness: Any = None) -> Ax
 
 
 for _name in __all__:
-    if isinstance(_drawn := globals()[_name], FunctionType):  # not the tuple ANGLES
+    if isinstance(_drawn := globals()[_name], FunctionType):  # only functions, not the tuple ANGLES
         globals()[_name] = in_written_units(_drawn)
 saved_by(save_with_footer, journal)
 register_figures(

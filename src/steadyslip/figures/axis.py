@@ -20,7 +20,7 @@ from steadyslip.machine.slider import Slider
 _RANGE_FACTOR = 20.0  # default range of a positive parameter: value / 20 to value x 20 (by trial)
 _BESIDE_EDGE = 2.0  # factor by which the default range extends beyond the nearest edge (by trial)
 _MAX_EDGE_RATIO = 1e3  # edges further from the value than this factor do not widen the default range (by trial)
-_EXCLUDED_END_MARGIN = 1 / 18  # share of a domain left out at each excluded end: 10 deg of 180 for an angle
+_EXCLUDED_END_MARGIN = 1 / 18  # share of a domain left out at an end that is not part of it: 10 deg of 180 for an angle
 
 
 @dataclass(frozen=True)

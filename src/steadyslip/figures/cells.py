@@ -11,7 +11,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.palette import BLACK
 from steadyslip.figures.chart import write_inside
 
-_FINE = 161  # points along each axis at which room for words is measured: half a 7-point letter in 85 mm
+_FINE = 161  # number of points along each axis at which room for words is measured: half a 7-point letter in 85 mm
 
 
 def mark_areas(ax: Axes, x: Array, y: Array, kinds: Array, words: Mapping[int, str]) -> None:

@@ -36,10 +36,10 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import explain_absence
 
-_CONTOUR_POINTS_LATE = 61  # points along each axis for rigs with delays: some 0.1 ms a point (measured)
-_STEPS = 8  # points per segment of a line at which words are kept away (by trial)
+_CONTOUR_POINTS_LATE = 61  # number of points along each axis for rigs with delays: a point takes some 0.1 ms (measured)
+_STEPS = 8  # words keep clear of this many points on each segment of a line (by trial)
 _LETTER, _LINE = 0.0105, 0.045  # half a letter's width, a line's height with halo: fractions of a new figure's axes
-_SAMPLES = 12  # most points at which the reason for no steady sliding is computed (by trial: time)
+_SAMPLES = 12  # limit of points at which the reason for no steady sliding is computed, for time (by trial)
 
 
 def stability_chart(
@@ -110,7 +110,7 @@ def stability_chart(
     reasons = _absence_reasons(rig, first, second, grid)
     absent = ~np.isin(grid, SLIDING)
     slides, far = regions.carried(grid, absent)
-    for code, (words, style) in AREAS.items():  # areas without steady sliding come last, on top
+    for code, (words, style) in AREAS.items():  # areas without steady sliding are drawn last, on top
         path = regions.region_path(
             inside(code), (slides if code in SLIDING else grid) == code, ~absent | (code not in SLIDING)
         )
@@ -135,7 +135,7 @@ def stability_chart(
 
 
 SLIDING = (STABLE, UNSTABLE, UNDAMPED)
-Place = Callable[[Any], tuple[Any, Any]]  # fractions of the axes, shape (n, 2), to their units
+Place = Callable[[Any], tuple[Any, Any]]  # from fractions of the axes, shape (n, 2), to their units
 
 
 def draw_edges(
@@ -143,9 +143,9 @@ def draw_edges(
 ) -> None:
     """Draw the edge of stability in the style of the disturbance that grows beyond it (oscillation or drift).
 
-    That is the least damped one at each point of the edge. `line`, shape (n, 2), has points in fractions of the axes,
-    NaN between pieces; `vary` returns the parameters at such points. The line is clipped to the outline `within`, a
-    path in the units of the axes, if given.
+    At each point of the edge this is the least damped disturbance. `line`, shape (n, 2), has points in fractions of the
+    axes, NaN between pieces; `vary` returns the parameters at these points. The line is clipped to the outline
+    `within`, a path in the units of the axes, if given.
     """
     kinds = np.full(len(line), "", dtype="<U16")
     known = np.flatnonzero(np.isfinite(line[:, 0]))
@@ -157,7 +157,7 @@ def draw_edges(
     least = np.take_along_axis(roots, np.argmin(rates, axis=-1)[:, None], axis=-1)[:, 0]
     kinds[known] = np.where(np.abs(least.imag) > np.abs(least.real), "oscillation", "drift")
     good = known[np.isfinite(roots).any(axis=-1)]
-    if len(good):  # points without eigenvalues get the kind of the nearest with
+    if len(good):  # points without eigenvalues get the kind of the nearest point that has eigenvalues
         kinds[known] = kinds[good[np.argmin(np.abs(known[:, None] - good), axis=1)]]
     for kind in ("oscillation", "drift"):
         here = kinds == kind
@@ -187,7 +187,7 @@ def _draw_contours(
     here = status_of(operating_point(rig, vary, scan=True)) if fine else grid[np.ix_(*2 * [chosen.astype(int)])]
     values = None
     with suppress(NotAvailable, ParameterError), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # delays too long for a verdict: no contours there
+        warnings.simplefilter("ignore")  # warnings on delays too long for a verdict: there are no contours there
         along = rig.parameter_along("stiffness") if late else None  # a delayed gain does not act as a stiffness
         values = safety_factor(rig, vary, along=along)
     if values is None or not np.isfinite(values).any():
@@ -210,8 +210,9 @@ def _draw_contours(
 def write_inside(ax: Axes, region: Any, words: str, place: Place, lines: Sequence[Any] = ()) -> bool:
     """Write words into the widest place of each connected area of a region; True if they fit into any.
 
-    They are written vertically where they fit only so. `region` is True inside, shape (rows, columns); `place` converts
-    fractions of the axes, (n, 2), to their units. Words keep clear of `lines`, vertices (n, 2) each, if possible.
+    Words are written vertically where they fit in no other way. `region`, shape (rows, columns), is True inside;
+    `place` converts fractions of the axes, (n, 2), to their units. If possible, words keep clear of `lines`, each given
+    by its vertices (n, 2).
     """
     from scipy.ndimage import label
 

@@ -17,8 +17,8 @@ from steadyslip.linear.status import STABLE, UNSTABLE
 
 SAFETY_LEVELS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 """Contour levels of the safety factor k/k_cr."""
-_FALL = 1.7  # |field two points away| / |field one point away| above which it may be 0 here: 2 for a linear field
-_ROUNDING = 1e-6  # |share - 0.5| within which status depends on rounding: 1e10 times that of a double
+_FALL = 1.7  # the field may be 0 at a point if |field two points away|/|field one point away| is larger; 2 if linear
+_ROUNDING = 1e-6  # status depends on rounding where |share - 0.5| is smaller: 1e10 times the rounding of a double
 _ROOM = 24.0  # least distance in pixels between a contour's label and another line (by trial)
 # Median distance to an edge or another contour, over the width of a figure, below which a piece of a contour is left
 # out (by trial).
@@ -90,7 +90,7 @@ def draw_levels(
         drawing = CONTOURS | style
         lines = ax.contour(x, y, field, levels=[levels[n] for n in shown], **drawing)
         pieces = _not_along(ax, [pieces_of(path) for path in lines.get_paths()], beside)
-        if not all(pieces):  # redraw without the levels that are left out entirely
+        if not all(pieces):  # redraw without those levels of which every piece is left out
             lines.remove()
             shown = [n for n, several in zip(shown, pieces, strict=True) if several]
             pieces = [several for several in pieces if several]
@@ -124,7 +124,7 @@ def pieces_of(path: Path) -> list[Array]:
 def _not_along(ax: Axes, contours: Sequence[Sequence[Array]], beside: Sequence[Array]) -> list[list[Array]]:
     """Pieces of the contours that keep the distance `_BESIDE` from the lines `beside` and from each other.
 
-    Of two pieces too close together that farther from the lines `beside` is kept.
+    Of two pieces that are too close to each other, the piece farther from the lines `beside` is kept.
     """
     least = _BESIDE * ax.get_figure(root=True).bbox.width  # type: ignore[union-attr]
 
@@ -160,6 +160,6 @@ def _apart(ax: Axes, line: Array, others: Sequence[Array], labels: Sequence[Arra
 
 
 def _thinned(line: Array) -> Array:
-    """Line thinned to vertices about `_CLOSE` pixels apart, with its first and last."""
+    """Line thinned to vertices about `_CLOSE` pixels apart; its first and last vertex are kept."""
     gone = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))]) // _CLOSE
     return np.asarray(line[np.concatenate([[True], np.diff(gone) > 0]) | (np.arange(len(line)) == len(line) - 1)])

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 _MARKERS = ("o", "s", "^", "D", "v")
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE)
-BESIDE = 0.2  # range to each side of a resonance, as share of its period, in which curves have more points
-HALF_TURN = 180.0  # degrees; a larger jump of phase is a turn by 360
+BESIDE = 0.2  # curves have more points within this share of the period to each side of a resonance
+HALF_TURN = 180.0  # degrees; a larger jump of the phase is due to its period of 360
 
 
 def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:

@@ -10,7 +10,7 @@ from steadyslip.core.palette import BLUE, GREY
 from steadyslip.figures.style import axis_label, display_unit, given_panels, new_panels
 from steadyslip.nonlinear.hunting.hunt_result import Hunt
 
-_LATER = 3.0  # for an axis that creeps to its target: end of the figure over the time of its last strokes
+_LATER = 3.0  # the figure of an axis that creeps to its target ends at this many times the time of its last strokes
 
 
 def hunting(result: Hunt, ax: Any = None) -> Any:
@@ -33,7 +33,7 @@ def hunting(result: Hunt, ax: Any = None) -> Any:
     """
     panels = given_panels(new_panels(2, 1, (6.4, 5.2), sharex=True)[:, 0] if ax is None else ax, (2,), "two Axes")
     end = float(result.time[-1]) if len(result.time) else 1.0
-    until = min(end, _LATER * result.approached_at or end)  # later the axis only rests on the target
+    until = min(end, _LATER * result.approached_at or end)  # afterwards the axis only rests on the target
     across, seconds = display_unit("s", until)
     series = (
         (f"target minus position{result.at_body}", result.error, result.unit),

@@ -17,8 +17,8 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.figures.style import JOURNAL, fit_words
 
 MAX_SVG_LENGTH = 90_000  # characters; a longer SVG is replaced by a PNG, so that pages stay small (by trial)
-_LEAST = 640.0  # least width of a PNG in pixels: sharp in one column on a screen with two per CSS pixel (by trial)
-_LARGE = 6.0  # width in inches above which a figure scrolls on a telephone, as its letters would be too small
+_LEAST = 640.0  # least width of a PNG in pixels: sharp on screens with two pixels per CSS pixel (by trial)
+_LARGE = 6.0  # inches; a wider figure scrolls on a telephone, because its letters would be too small
 # Smallest factor by which a figure is narrowed: its letters keep their size, and leave no room for axes below it (by
 # trial with the verdict on a machine, 8 inches for 9.6).
 _LEAST_SCALE = 0.83

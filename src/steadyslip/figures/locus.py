@@ -21,8 +21,8 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
 _RANGE_FACTOR = 1e2  # default range of stiffness: two decades to each side of its centre
-_VIEW_FACTOR = 3.0  # half width of the view over the largest |s| of the eigenvalues that decide stability (by trial)
-_FAST_RATIO = 1e3  # decaying eigenvalues with |s| above this times the lowest |s| are left out of view (by trial)
+_VIEW_FACTOR = 3.0  # half width of the view over the largest |s| of the eigenvalues that decide on stability (by trial)
+_FAST_RATIO = 1e3  # decaying eigenvalues with |s| over this many times the lowest |s| are left out of view (by trial)
 
 
 def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Axes:

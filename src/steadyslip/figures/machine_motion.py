@@ -33,13 +33,13 @@ if TYPE_CHECKING:
 _CONTACTS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)  # line colours, in the order of the contacts
 MAX_SHADED_EVENTS = 40  # slip events are shaded only if fewer than this: more would merge (by trial)
 MIN_BAND_SHARE = 4e-3  # least width of a shaded slip event, as share of the time axis: about two pixels
-_MIN_SPAN = 1e-3  # least span of an axis over the largest value, so that rounding is not magnified (by trial)
+_MIN_SPAN = 1e-3  # least span of an axis over its largest value, so that rounding errors are not magnified (by trial)
 # In runs that lose contact, share of the largest normal force below which friction does not set its axis: a ratio of
 # two vanishing forces grows without bound, and would press all else into a line.
 _PRESSED = 0.1
-_LOG_RATIO = 3.0  # highest over lowest slip rate above which the axis is logarithmic (by trial)
-_MIN_STEADY_RATIO = 1e-3  # least slip rate of the line of steady states over the highest of the run
-_SHADE = 0.4  # opacity of shading: 10 steps of lightness L* (of 100) from white, and curves stay in sight (by trial)
+_LOG_RATIO = 3.0  # the axis of slip rates is logarithmic if highest over lowest slip rate is larger (by trial)
+_MIN_STEADY_RATIO = 1e-3  # the line of steady states begins at this share of the highest slip rate of the run
+_SHADE = 0.4  # opacity of shading: differs from white by 10 of 100 in lightness, and curves stay visible (by trial)
 # Slip rate over the steady one beyond which a run that ends early is not drawn: there effects decide that the model
 # leaves out, such as mass.
 LEAVES = 1e4
@@ -79,7 +79,9 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
 def phase_plane(
     run: History, rig: Machine, ax: Axes | None, label: str, color: str, contact: str | None
 ) -> Axes:  # fmt: skip
-    """Plot friction force against slip rate at a contact, with the line of steady states, and a dot at that of the end.
+    """Plot friction force against slip rate at a contact, with the line of steady states.
+
+    A dot marks the steady state for the velocity of the drive at the end.
 
     The slip-rate axis is logarithmic if slip rates are positive and span more than a factor of three.
     """
@@ -89,18 +91,18 @@ def phase_plane(
     scale, unit = display_unit("m/s", abs(own))
     factor, force_unit = display_unit("N", float(np.nanmax(np.abs(force), initial=0.0)) or 1.0)
     left = leaves(run, rate, own)
-    shown_rate = np.where(left, np.nan, rate) / scale  # NaN: not drawn
+    shown_rate = np.where(left, np.nan, rate) / scale  # NaN is not drawn
     ax.plot(shown_rate, force / factor, color=color, label=label or "the run", linewidth=1)
     mark_end(run, ax, shown_rate, force / factor, left)
     low, high = float(np.nanmin(shown_rate)), float(np.nanmax(shown_rate))
     logarithmic = low > 0 and high > _LOG_RATIO * low
-    if ax.get_xlabel():  # Axes of another run: keep their scales and labels
+    if ax.get_xlabel():  # the Axes already show another run: keep their scales and labels
         add_arrowheads(ax, shown_rate, force / factor, color)
         add_legend_above(ax, 3, 1.0, fontsize="small")
         return ax
     if logarithmic:
         ax.set_xscale("log")
-        if high < 100 * low:  # less than two decades: label ticks with plain numbers
+        if high < 100 * low:  # for less than two decades, ticks have plain numbers
             plain_log_ticks(ax.xaxis)
     if abs(high - low) < _MIN_SPAN * max(abs(high), abs(low)):
         ax.set_xlim(*sorted((0.9 * low, 1.1 * high)))  # otherwise rounding would fill the panel

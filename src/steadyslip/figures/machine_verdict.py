@@ -48,7 +48,7 @@ def machine_verdict(found: Analysis) -> np.ndarray:
     if found.mode is None:
         return np.array([stable_ranges(found, axes_or_new(None, 1.4 + 0.32 * rows))])
     width = rcParams["figure.figsize"][0]
-    bars = 1.2 + 0.28 * len(found.mode.amplitudes)  # inches for the mode and its energies
+    bars = 1.2 + 0.28 * len(found.mode.amplitudes)  # height (inches) of the panel with the mode and its energies
     if not is_narrow():
         size = 1.5 * width, max(1.6 + 0.34 * rows, 3.0 + bars)
         layout: Any = [["ranges", "mode"], ["ranges", "plane"]]
@@ -139,7 +139,7 @@ def _pieces(margin: Margin) -> list[tuple[float, float, int]]:
     ends = [0.0, *(edge.value for edge in edges), math.inf]
     stable = [edges[0].stable == "below", *(edge.stable == "above" for edge in edges)]
     lost = [sum(edge.kind in LOST for edge in edges[:n]) for n in range(len(edges) + 1)]
-    own = lost[sum(edge.value < margin.value for edge in edges)]  # the rig itself slides steadily
+    own = lost[sum(edge.value < margin.value for edge in edges)]  # the rig's own interval: it slides steadily
     status = [
         ABSENT if (many - own) % 2 else STABLE if good else UNSTABLE for many, good in zip(lost, stable, strict=True)
     ]
@@ -149,10 +149,9 @@ def _pieces(margin: Margin) -> list[tuple[float, float, int]]:
 def mode_shape(found: Analysis | Modes, ax: Axes | None = None) -> Axes:
     """Plot the amplitude of every body in a mode, and the largest shares of its energy.
 
-    For an analysis the leading mode, for `steadyslip.modes` the chosen one. Blue bars: amplitudes over the largest one,
-
-    each relative to the rigid motion of the machine; bars of bodies in opposite phase point to the left. Orange bars:
-    shares of energy.
+    For an analysis this is the leading mode, for `steadyslip.modes` the chosen mode. Blue bars: amplitudes over the
+    largest amplitude, each relative to the rigid motion of the machine; bars of bodies in opposite phase point to the
+    left. Orange bars: shares of energy.
 
     Raises
     ------

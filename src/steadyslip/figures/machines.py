@@ -18,7 +18,7 @@ from steadyslip.machine.machine import Machine
 COLORS = {INK: BLACK, PALE: "#777777", DRIVEN: BLUE, FORCED: VERMILION}
 BODY_COLOUR = "#DDE3EA"
 LARGE, SMALL = 9.0, 7.5  # font sizes in points
-_INCHES_PER_UNIT = 0.66  # inches per unit of the sketch: texts of 7.5 points just fit (by trial)
+_INCHES_PER_UNIT = 0.66  # inches per length unit of the sketch: texts of 7.5 points just fit (by trial)
 
 
 def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:

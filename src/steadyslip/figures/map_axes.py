@@ -51,7 +51,7 @@ def short_name(name: str) -> str:
 
 
 def parameter_words(found: MapResult, name: str) -> str:
-    """Label of a parameter of a map: words and letter if it is of the rig, else `short_name` (times of a protocol)."""
+    """Label of a parameter of a map: words and letter for the rig's parameters, `short_name` for a protocol's."""
     with suppress(NotAvailable):
         if name in found.rig.parameters():
             return stress_name(parameter_label(found.rig, name), found.area(name))

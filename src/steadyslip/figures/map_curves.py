@@ -58,7 +58,7 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
     values = np.asarray(view.values[name])[order]
     unit = found.unit(name)
     finite = values[np.isfinite(values)]
-    if name in view.bands:  # zeros mark failed samples: they do not set the scale
+    if name in view.bands:  # zeros mark failed samples, and do not set the scale
         finite = view.bands[name][np.isfinite(view.bands[name]) & (view.bands[name] != 0)]
     scale = Scale(name, unit, finite if len(finite) else np.ones(1), spaced=False, area=found.area(name))
     if values.ndim == 3:  # ends of stable intervals: (points, intervals, 2)
@@ -70,7 +70,7 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
             ax.fill_between(x, scale(low), scale(high), color=CURVES[i % len(CURVES)], alpha=0.4,
                             label=f"interval {i + 1} of {name.replace('_', ' ')}")  # fmt: skip
     elif name in view.bands:
-        top = 1e3 * finite.max(initial=1.0)  # infinite samples: the band ends beyond the axis
+        top = 1e3 * finite.max(initial=1.0)  # with infinite samples the band ends beyond the axis
         low, middle, high = (scale(np.minimum(band[order], top)) for band in view.bands[name])
         ax.fill_between(x, low, high, color=BLUE, alpha=0.25, linewidth=0, label="95 % of samples")
         ax.plot(x, middle, color=BLUE, label="median of samples" + missing_note(view, name))

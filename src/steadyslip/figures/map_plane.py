@@ -47,9 +47,9 @@ from steadyslip.model.numeric import by_matrices
 from steadyslip.model.point import operating_point
 
 _POWERS, _SUPERSCRIPTS = 4, str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")  # 0.001 to 1000 are printed as plain numbers
-_ROOM = 0.03  # share of an axis added beyond its end so that a mark there is drawn whole: over half its size
-_CLOSER, _MOST = 8, 101  # refinement of a map's grid for contours; most points along an axis
-_FINE = 8  # refinement of a map's grid for placing words in areas
+_ROOM = 0.03  # share of an axis added at an end, so that a mark there is drawn whole: over half its size
+_CLOSER, _MOST = 8, 101  # contours use a grid _CLOSER times finer than the map's, at most _MOST points along an axis
+_FINE = 8  # words in areas are placed on a grid this many times finer than the map's
 
 
 def draw_plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) -> None:
@@ -104,7 +104,7 @@ def _areas(ax: Axes, found: MapResult, view: View, refined: _Refined) -> Path | 
     status = view.values["status"]
     absent = ~np.isin(status, SLIDING)
     slides, _ = regions.carried(status, absent)
-    for code, (words, style) in AREAS.items():  # the areas of no steady sliding last, on top
+    for code, (words, style) in AREAS.items():  # areas without steady sliding are drawn last, on top
         if not (here := status == code).any():
             continue
         label = words + (_absence_reasons(found, view, here) if code == ABSENT else "")
@@ -120,7 +120,7 @@ def _areas(ax: Axes, found: MapResult, view: View, refined: _Refined) -> Path | 
 
 
 def _words(ax: Axes, status: Array, refined: _Refined, lines: Sequence[Array]) -> None:
-    """Write the word of each status into its area if it fits, and drop its legend entry then."""
+    """Write the word of each status into its area; if it fits, the legend entry of the status is removed."""
     fine = np.repeat(np.repeat(status, _FINE, axis=0), _FINE, axis=1)
     for code, (words, _) in AREAS.items():
         if (fine == code).any() and write_inside(ax, fine == code, words, refined.place, lines):
@@ -152,7 +152,7 @@ def _pieces(line: Array) -> list[Array]:
 
 
 class _Refined:
-    """Evaluates status between the points of a map from its rig, or if there is none from the nearest points."""
+    """Status between the points of a map: computed with the map's rig, or without a rig that of the nearest point."""
 
     def __init__(self, found: MapResult, view: View, scales: Sequence[Scale]) -> None:
         self.view, self.scales = view, scales
@@ -180,7 +180,7 @@ class _Refined:
     def finer(self, name: str, along: str | None, values: Array) -> tuple[Array, Array, Array, Array]:
         """Data for contours on a grid `_CLOSER` times finer: x (m,), y (n,) axis units; status, result (n, m).
 
-        For results that cannot be recomputed quickly, or without a rig, those of the map itself.
+        Results that cannot be recomputed quickly, and those of maps without a rig, are the values of the map itself.
         """
         status = self.view.values["status"]
         sizes = [min(_CLOSER * (n - 1) + 1, max(n, _MOST)) for n in status.shape[::-1]]
@@ -196,7 +196,7 @@ class _Refined:
         return x, y, status, np.where(np.isin(status, SLIDING) & (status != UNDAMPED), rate, np.nan)
 
     def outline(self, mask: Array, *codes: int, known: Any = True) -> Path:
-        """Outline, in units of the axes, of the region with one of the status `codes`; `mask` has it on the grid."""
+        """Outline, in units of the axes, of the region with a status in `codes`; `mask` is this region on the grid."""
         if min(mask.shape) < 2 or not len(path := regions.region_path(self.has(*codes), mask, known)):
             return Path(np.empty((0, 2)))
         return Path(np.column_stack(self.place(path.vertices)), path.codes)
@@ -344,7 +344,7 @@ def _mark_own(
     """Mark the base rig, if in view, and the nearest point of the edge, with its values if `with_values`."""
     own = [own_value(found, name) for name in view.names]
     if not all(_is_own(found, name, value) for name, value in view.held.items()):
-        return  # the rig belongs to another panel, or to none
+        return  # the rig belongs to another panel, or to no panel
     limits = [ax.get_xlim(), ax.get_ylim()]
     if any(value is None for value in own):
         return

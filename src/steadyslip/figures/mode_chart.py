@@ -22,15 +22,15 @@ from steadyslip.linear import ModeChart
 
 _GROWING, _OTHERS = (VERMILION, ORANGE, PURPLE), (BLUE, GREEN, SKY)
 _ROOM = 0.1  # free height above and below the coloured oscillations, as share of their range
-_DECADES = 20.0  # ratio of highest to lowest frequency from which the axis is logarithmic
-_DEEP = 3.0  # largest damping ratio drawn, over the largest growth or least decay
+_DECADES = 20.0  # the frequency axis is logarithmic if highest over lowest frequency is at least this
+_DEEP = 3.0  # damping ratios are drawn up to this many times the largest growth or least decay
 
 
 def mode_chart(found: ModeChart, ax: Any = None) -> Any:
     """Plot frequencies and damping ratios of modes over a parameter.
 
-    The eight least damped oscillations are coloured, in warm colours those that grow somewhere, with thick lines where
-    they grow. Grey: others. Dashed: edges of stability. Dotted: the machine's own value.
+    The eight least damped oscillations are coloured; those that grow somewhere have warm colours, and thick lines where
+    they grow. Grey: other modes. Dashed: edges of stability. Dotted: the machine's own value.
 
     Parameters
     ----------

@@ -40,9 +40,9 @@ from steadyslip.protocol.protocol import NORMAL_STRESS
 if TYPE_CHECKING:
     from steadyslip.motion import History
 
-_ROUNDING = 1e-6  # relative change of a normal force that counts as constant: above errors of integration
-_MIN_SPAN = 2e-3  # least span of an axis over the largest value, so that rounding is not magnified (by trial)
-_STEADY_POINTS = 161  # points of the line of steady states: a bend of one decade is smooth in a figure 160 mm wide
+_ROUNDING = 1e-6  # a normal force is constant if its relative change is smaller: above errors of integration
+_MIN_SPAN = 2e-3  # least span of an axis over its largest value, so that rounding errors are not magnified (by trial)
+_STEADY_POINTS = 161  # points of the line of steady states: a bend over a decade is smooth in a figure 160 mm wide
 
 
 def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
@@ -127,7 +127,10 @@ def _constant_load(run: History) -> str:
 
 
 def _limit_zoom(ax: Axes, *shown: np.ndarray) -> None:
-    """Keep the y axis at least `_MIN_SPAN` times the largest value high (rounding is not magnified); no tick offset."""
+    """Make the y axis span at least `_MIN_SPAN` times the largest value, so that rounding is not magnified.
+
+    Tick labels get no offset.
+    """
     values = np.concatenate([values[np.isfinite(values)] for values in shown])
     if ax.get_yscale() == "linear":
         ax.ticklabel_format(axis="y", useOffset=False)
@@ -164,7 +167,7 @@ def _velocity_panel(run: History, v: np.ndarray, ax: Axes, time: np.ndarray) -> 
     if moves and _ticks_between(together.min() / factor, together.max() / factor) > 1:
         ax.set_yscale("log")
         load = load_shown
-        if np.nanmax(v) < 100 * np.nanmin(v):  # less than two decades: numbers instead of powers of ten
+        if np.nanmax(v) < 100 * np.nanmin(v):  # for less than two decades, ticks have plain numbers
             plain_log_ticks(ax.yaxis)
     ax.plot(time, load / factor, color=BLACK, linewidth=0.8, zorder=1.5, label=reference)
     ax.plot(time, v / factor, color=BLUE, label="block")

@@ -52,8 +52,8 @@ _STEADY: dict[str, dict[str, Any]] = {
 }
 """Line styles of steady sliding: stable, unstable, and dotted where that is not known."""
 _UNDECIDED_HATCHES = ("++", "oo", "..")
-NARROW_RANGE = 1e-3  # relative range of a branch below which the axis shows the distance from the onset (by trial)
-BEYOND = 1.5  # drawn range of steady sliding beyond the onset: this factor, or in tenths of the branch (by trial)
+NARROW_RANGE = 1e-3  # if the relative range of a branch is smaller, the axis has the distance from the onset (by trial)
+BEYOND = 1.5  # drawn range of steady sliding beyond the onset, as a factor, or in tenths of the branch (by trial)
 LEGEND_WIDTH = 36  # characters per line of a legend with two columns
 
 
@@ -83,7 +83,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     area, origin, along = branch.rig.printed_area(branch.along), 0.0, parameter_label(branch.rig, branch.along)
     factor, unit = display_unit(branch.unit, branch.onset.value, area)
     reach = max((abs(one.value - branch.onset.value) for one in branch.cycles), default=0.0)
-    if 0 < reach < NARROW_RANGE * abs(branch.onset.value):  # tick labels of values would all look alike
+    if 0 < reach < NARROW_RANGE * abs(branch.onset.value):  # tick labels with the values would all look alike
         origin = branch.onset.value
         factor, unit = display_unit(branch.unit, reach, area)
         along = f"{along} minus {format_quantity(origin, branch.unit, 6, area)}"

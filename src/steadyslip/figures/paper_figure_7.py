@@ -20,8 +20,8 @@ from steadyslip.model.point import operating_point
 from steadyslip.units import deg
 
 ANGLES = tuple(degrees * deg for degrees in (-45, -30, 0, 30, 45))  # rad, as in the paper
-_MAX_MASS = 1e6  # highest m* searched: a limit above it counts as none
-_MIN_MASS = 1e-12  # lowest m* searched: stands for a quasistatic rig
+_MAX_MASS = 1e6  # highest m* searched; a higher limit counts as no limit
+_MIN_MASS = 1e-12  # lowest m* searched, which stands for a quasistatic rig
 _CROSSING_TOLERANCE = 1e-6  # largest relative spread of the curves of all angles that counts as one crossing point
 
 
@@ -217,7 +217,7 @@ def mass_of_no_stiffness(rig: Slider, angle: float) -> float:
     low, high = _MIN_MASS, _MAX_MASS
     if not exists(low) or exists(high):
         return math.nan
-    for _ in range(16):  # each divides the logarithmic bracket by 32: 18 decades to far below rounding
+    for _ in range(16):  # each round divides the logarithmic bracket by 32: from 18 decades to far below rounding
         samples = np.geomspace(low, high, 33)
         first = int(np.argmin(exists(samples)))
         low, high = samples[first - 1], samples[first]

@@ -13,8 +13,8 @@ import numpy as np
 from contourpy import FillType, LineType, contour_generator
 from matplotlib.path import Path
 
-Predicate = Callable[[Any, Any], Any]  # fractions of the two axes, 0 to 1, to bool
-_HALVINGS = 40  # bisections of a grid spacing: to 1e-12 of it
+Predicate = Callable[[Any, Any], Any]  # function of the fractions of the two axes, 0 to 1, that returns bool
+_HALVINGS = 40  # number of bisections of a grid spacing: to 1e-12 of the spacing
 
 
 def region_path(predicate: Predicate, mask: Any, known: Any = True) -> Path:
@@ -48,7 +48,9 @@ def edges(predicate: Predicate, mask: Any, left_out: Any = False, known: Any = T
 
 
 def carried(grid: Any, missing: Any) -> tuple[Any, Any]:
-    """Grid with missing values replaced by the nearest known ones, and mask of those more than a grid point from any.
+    """Grid with missing values replaced by the nearest known values, and mask of points far from known values.
+
+    The mask is True more than one grid point from any known value.
 
     Regions and lines drawn from it extend beneath the region of missing values, so that no gap shows at its outline.
     """
@@ -67,9 +69,9 @@ def on_grid(function: Predicate, points: int) -> Any:
 
 
 def widest_place(mask: Any, size: tuple[float, float]) -> tuple[float, float, float]:
-    """Centre of the largest ellipse inside a region, in fractions of the axes, and its size over `size`.
+    """Centre of the largest ellipse inside a region, in fractions of the axes, and ratio of its size to `size`.
 
-    `size` is half the width and half the height of an ellipse, in fractions of the axes.
+    `size` has half the width and half the height of an ellipse of the wanted shape, in fractions of the axes.
     """
     from scipy.ndimage import distance_transform_edt
 

@@ -65,10 +65,10 @@ Words of size "small" have 6.5 points (0.83 of "font.size"): 9.5 pixels on a tel
 """
 _SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "path"}  # fonts are embedded
 _TITLE_GAP = 4.0  # points between a legend and the title above it
-_LEGEND_LETTERS = 42  # most letters of a legend line: 0.5 of 6.5 points each, in 60 mm of Axes in a figure of 85 mm
-_SMALLEST = 0.6  # smallest factor by which words in areas are shrunk: 4 points at 85 mm, the least legible
+_LEGEND_LETTERS = 42  # largest number of letters in a legend line: 6.5 points, half as wide, in 60 mm of Axes
+_SMALLEST = 0.6  # smallest factor by which words in areas are shrunk: to 4 points in 85 mm, just legible
 AREA_WORD = "word of an area"  # gid of Matplotlib texts that name areas
-_FEW_DECADES = 5  # most decades of a logarithmic axis that are all numbered
+_FEW_DECADES = 5  # a logarithmic axis with more decades does not have a number at every decade
 _OF_UNIT = re.compile(r"(?<=\d) (?=[^\W\d])")  # space between a number and its unit
 _FOOTER = 6.0  # points, letter size of the footer of a saved figure
 HALO: list[AbstractPathEffect] = [withStroke(linewidth=2.5, foreground="white", alpha=0.8)]
@@ -169,7 +169,7 @@ def save_with_footer(axes: Any, path: str, result: Any) -> None:
     file, about = _footer(result, figure.axes)
     most = int(width * 72 / (0.55 * _FOOTER))  # letters per line: each 0.55 of its size wide
     words = fill(f"{file}{about}", most, break_long_words=False, break_on_hyphens=False)
-    text = _plain(file) + with_subscripts(words[len(file) :])  # a_b in a file's name is no subscript
+    text = _plain(file) + with_subscripts(words[len(file) :])  # a_b in a file's name does not mean a subscript
     extra = (1 + text.count("\n")) * 1.3 * _FOOTER / 72 + 0.06  # inches
     figure.set_size_inches(width, height + extra)
     if engine := figure.get_layout_engine():
@@ -181,7 +181,7 @@ def save_with_footer(axes: Any, path: str, result: Any) -> None:
 
 
 def _keep_inside(ax: Axes) -> None:
-    """Move words in areas into the frame, if the axes have become smaller since they were placed; shrink longer ones.
+    """Move words in areas into the frame if the axes have become smaller; words longer than the frame are shrunk.
 
     Words that would shrink to less than `_SMALLEST` of their size are hidden: the legend has them.
     """
@@ -248,7 +248,7 @@ def _parts_ticks(figure: Any, bins: int) -> bool:
         if touching and isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
             ax.locator_params(axis="x", nbins=bins)
             found = True
-        elif touching and isinstance(ax.xaxis.get_major_locator(), FixedLocator):  # explicit ticks: keep every other
+        elif touching and isinstance(ax.xaxis.get_major_locator(), FixedLocator):  # keep every other of explicit ticks
             ax.set_xticks(ax.get_xticks()[::2], [one.get_text() for one in ax.get_xticklabels()[::2]])
             found = True
     return found
@@ -263,7 +263,7 @@ def plain_log_ticks(axis: Axis) -> None:
 
 def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
     """File name of a result; footer text with law, values (fitted, held, at first), protocol, version and date."""
-    fit = getattr(result, "fit", result)  # draws have their fit
+    fit = getattr(result, "fit", result)  # a sample of draws contains its fit
     plan = getattr(fit, "plan", None)
     rig = fit.rig() if hasattr(plan, "records") else getattr(result, "rig", None)
     parts, file = [], ""
@@ -272,7 +272,7 @@ def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
         fitted = {name.partition("@")[0] for name in estimates}
         labels = [text for ax in axes for text in (ax.get_xlabel(), ax.get_ylabel())]
         shown = [name for name in rig.parameters() if _on_an_axis(rig, name, labels)]
-        protocol = getattr(getattr(result, "run", result), "protocol", None)  # of the result, or of its run
+        protocol = getattr(getattr(result, "run", result), "protocol", None)  # of the result itself, or of its run
         changed = changed_by(rig, protocol) if isinstance(protocol, Protocol) else []
         held = ", ".join(_values_of(rig, [one for one in rig.parameters() if one not in {*fitted, *shown, *changed}]))
         first = ", ".join(_values_of(rig, changed))
@@ -282,7 +282,7 @@ def _footer(result: Any, axes: Sequence[Axes]) -> tuple[str, str]:
         )
         laws = [one.friction for one in rig.laws_by_contact().values()] if fitted else []
         words = dict.fromkeys(f"{law.name} friction{_kind(law)}" for law in laws)
-        file = rig.read_from or getattr(getattr(result, "path", None), "name", "")  # maps have a path
+        file = rig.read_from or getattr(getattr(result, "path", None), "name", "")  # a map has a path
         parts = [*words, f"fitted: {about}" if about else "", f"held: {held}" if held else ""]
         done = _OF_UNIT.sub("\xa0", typeset(done))
         parts += [f"at first: {first}" if first else "", f"protocol: {done}" if done else ""]
@@ -306,7 +306,7 @@ def _unbroken(text: str) -> str:
 
 
 def _kind(law: Any) -> str:
-    """Names of the parts of a law, such as its evolution law, in brackets; empty if it has no parts."""
+    """Names of the parts of a law, such as its evolution law, in brackets; empty if the law has no parts."""
     names = ", ".join(one.name for one in records_in(law) if getattr(one, "name", "none") != "none")
     return f" ({names})" if names else ""
 
@@ -341,7 +341,7 @@ def add_legend_above(
     if is_narrow():
         labels = [label if len(label) <= _LEGEND_LETTERS or "$" in label else _wrapped(label) for label in labels]
     kept = [(one, label) for one, label in zip(handles, labels, strict=True) if not label.startswith(tuple(without))]
-    for many in range(columns, 0, -1):  # reduce until no wider than the axes
+    for many in range(columns, 0, -1):  # fewer columns until the legend is no wider than the axes
         legend = ax.legend(
             *zip(*kept, strict=True),
             loc="lower left",

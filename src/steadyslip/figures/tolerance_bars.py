@@ -14,7 +14,7 @@ from steadyslip.verdict.tolerances import Tolerated
 from steadyslip.verdict.words import format_parameter_range
 
 COLOURS = {True: STABLE, False: UNSTABLE, None: UNKNOWN}
-_DECADE = 10.0  # ratio of safety factors from which their axis is logarithmic
+_DECADE = 10.0  # the axis is logarithmic if the ratio of safety factors is at least this
 WORDS = {True: "stable throughout", False: "unstable throughout", None: "stable in a part"}
 
 

@@ -24,8 +24,8 @@ from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import growth_rate
 from steadyslip.verdict import RigComparison
 
-_POINTS = 121  # along the curves
-_BEYOND = 3.0  # factor beyond the values of both rigs up to which curves go (by trial)
+_POINTS = 121  # number of points along each curve
+_BEYOND = 3.0  # curves extend beyond the values of both rigs by this factor (by trial)
 _SPEED = "drive.velocity"
 _CURVES: Any = (
     {"color": BLACK, "linestyle": "-", "marker": "o"},

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from steadyslip.experiments import LawComparison, Prediction, Profile
     from steadyslip.experiments.answers.precision import Ranking
 
-MAX_AXIS_DISTANCE = 10.0  # in widths of the draws' 95 % range: a rig farther from it is not drawn (by trial)
+MAX_AXIS_DISTANCE = 10.0  # a rig farther from the draws' 95 % range than this many widths of it is not drawn (by trial)
 
 
 def profile(result: Profile, ax: Axes | None = None) -> Axes:
@@ -181,7 +181,7 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
     low, high = np.quantile(critical, [0.025, 0.975])
     if low - MAX_AXIS_DISTANCE * (high - low) <= own <= high + MAX_AXIS_DISTANCE * (high - low):
         ax.axvline(own / factor, color=VERMILION, linewidth=1.5, label="this rig")
-    else:  # including it would squeeze the histogram to a line
+    else:  # the rig is far away: including it would squeeze the histogram to a line
         side = "beyond" if own > high else "below"
         ax.plot(
             [],

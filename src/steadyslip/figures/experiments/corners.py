@@ -22,13 +22,13 @@ from steadyslip.machine.rig import Rig
 if TYPE_CHECKING:
     from steadyslip.experiments import Estimate, Fit
 
-LEVELS = (0.68, 0.95)  # probability inside the contours, as of one and two standard deviations
+LEVELS = (0.68, 0.95)  # probability inside each contour, as for one and two standard deviations
 STYLES: tuple[Literal["-"], Literal["--"]] = ("-", "--")
 PILE_UP_SHARE = 0.02  # share of draws at an extreme value above which it is a bound of the search (by trial)
 BINS = 48  # bins along each axis for the density of draws: finer than its smoothing (by trial)
-MOST_IN_COLUMN = 4  # most panels side by side in 85 mm: a name and three numbers of 7 points take some 18 mm
+MOST_IN_COLUMN = 4  # largest number of panels side by side in 85 mm: a name and three numbers of 7 points take 18 mm
 TWO_COLUMNS = 180 / 25.4  # inches: width of two journal columns with the gap between them
-MAX_DOTS = 4000  # draws plotted as dots; more only darken the panel (by trial)
+MAX_DOTS = 4000  # largest number of draws plotted as dots; more dots only darken the panel (by trial)
 
 
 def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
@@ -85,7 +85,7 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
             panel.axvline(scales[k].best, color=VERMILION, linewidth=0.8)
             if i != k:
                 panel.axhline(scales[i].best, color=VERMILION, linewidth=0.8)
-    if len(names) > 1:  # in the empty upper triangle
+    if len(names) > 1:  # the legend is in the empty upper triangle
         color = BLACK if isinstance(result, Draws) else BLUE
         lines = [Line2D([], [], color=color, linestyle=style, linewidth=1) for style in STYLES]
         words = [f"holds {100 * level:.0f} %" for level in LEVELS]
@@ -169,7 +169,7 @@ def _draw_sample(panel: Axes, x: np.ndarray, y: np.ndarray, alone: bool) -> None
             levels=[density_level(density, level) for level in LEVELS[::-1]], colors=BLACK, linewidths=1,
             linestyles=STYLES[::-1],
         )  # fmt: skip
-    for values, limit in ((x, panel.set_xlim), (y, panel.set_ylim)):  # end the axis at a bound of the search
+    for values, limit in ((x, panel.set_xlim), (y, panel.set_ylim)):  # axes end at bounds of the search
         low, high = float(np.min(values)), float(np.max(values))
         limit(
             low if np.mean(values == low) > PILE_UP_SHARE else None,

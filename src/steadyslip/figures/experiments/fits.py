@@ -26,10 +26,10 @@ from steadyslip.figures.style import add_legend_above, axis_label, display_unit
 if TYPE_CHECKING:
     from steadyslip.experiments import Fit, Record
 
-MAX_LAGS = 60  # lags (samples) of the autocorrelation
+MAX_LAGS = 60  # largest lag of the autocorrelation that is drawn, samples
 MAX_STEPS = 12  # most panels of `steps`: four rows of three
-MIN_STRESS_CHANGE = 0.01  # relative smooth change of normal stress below which it is not drawn (by trial)
-ZOOM_SHARES = (0.15, 0.6)  # shares of the time to the previous and next step that are drawn (by trial)
+MIN_STRESS_CHANGE = 0.01  # normal stress is not drawn if its smooth relative change is smaller (by trial)
+ZOOM_SHARES = (0.15, 0.6)  # drawn shares of the times to the previous and to the next step (by trial)
 
 
 def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.ndarray:
@@ -175,7 +175,7 @@ def _samples_near(data: Record, k: int) -> np.ndarray:
 
 
 def _running_mean(values: np.ndarray) -> np.ndarray:
-    """Running mean (n,) over a fiftieth of the record, over fewer samples at its ends."""
+    """Running mean (n,) over a fiftieth of the record; at the ends of the record over fewer samples."""
     half = max(len(values) // 100, 1)
     total = np.concatenate([[0.0], np.cumsum(values)])
     low = np.maximum(np.arange(len(values)) - half, 0)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from steadyslip.experiments.loading.loading import Course
 
 MAX_NAME_LENGTH = 60  # characters of a file name in a title: what fits above a panel
-LEGEND_DOT_SIZE = 6.0  # size of dots in a legend, points: dots of data can be too small to see there
+LEGEND_DOT_SIZE = 6.0  # points, size of dots in a legend, where the smaller dots of the data could not be seen
 
 
 def stacked_panels(ax: Any, heights: tuple[float, ...], shared: int | None = None) -> np.ndarray:
@@ -38,7 +38,7 @@ def panel_grid(ax: Any, rows: int, columns: int, size: tuple[float, float]) -> n
 
 
 def time_axis(data: Record) -> tuple[float, str, float]:
-    """Time axis of a record: size (s) and name of its unit, and time (s) of its zero, the first step or sample."""
+    """Unit of the time axis (size in s, and name) and time (s) of its zero: the first step, or the first sample."""
     origin = data.steps[0].time if data.steps else float(data.time[0])
     factor, unit = display_unit("s", float(np.ptp(data.time)))
     return factor, unit, origin

@@ -23,8 +23,8 @@ from steadyslip.figures.style import axis_label, display_unit
 if TYPE_CHECKING:
     from steadyslip.experiments import Record
 
-MAX_HIDDEN_SHARE = 0.01  # largest share of rates <= 0 at which a logarithmic axis, which hides them, is used (by trial)
-LOG_RATE_RATIO = 5.0  # highest over lowest commanded rate above which their axis is logarithmic (by trial)
+MAX_HIDDEN_SHARE = 0.01  # a logarithmic axis, which hides rates <= 0, is used up to this share of them (by trial)
+LOG_RATE_RATIO = 5.0  # the axis of rates is logarithmic if highest over lowest commanded rate is larger (by trial)
 
 
 def record(data: Record, ax: Sequence[Axes] | None = None) -> np.ndarray:

@@ -75,7 +75,7 @@ def escaped(text: str) -> str:
 
 
 def value_with_error(one: Estimate | None) -> str:
-    """LaTeX text of value ± error in the unit of the table, rounded to two digits of the error; -- for None.
+    """LaTeX text of value ± error in the unit of the table, rounded to two digits of the error; the text `--` for None.
 
     A value that the fit does not determine is in parentheses, and a value without error stands alone.
     """

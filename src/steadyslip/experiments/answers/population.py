@@ -1,8 +1,8 @@
 """Hierarchical (partially pooled) analysis of several experiments on one rock.
 
 The true parameters of each experiment are taken as a sample from a population with unknown mean and covariance.
-Estimates that an experiment determines poorly are shifted towards the population's mean, the more so the less the
-experiments differ.
+Estimates that an experiment determines poorly are shifted towards the population's mean; the shift is the larger, the
+less the experiments differ.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from steadyslip.experiments.numerics.pooling import Pooled, pooled
 from steadyslip.files.result_tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.files.sealed import FileKind
 
-FEWEST = 3  # least number of experiments that determine a parameter: two do not show a spread
+FEWEST = 3  # each parameter must be determined by this many experiments at least: two do not show a spread
 ENDS = (0.025, 0.16, 0.5, 0.84, 0.975)  # probabilities of the quantiles: median, and 68 % and 95 % intervals
 POPULATION = FileKind("population", 3, 2**30, "make the population of its fits again and save it anew")
 _ATTRIBUTES = {"names": str, "scale": float, "chains": int, "steps": int, "time": float}
@@ -64,12 +64,13 @@ class Population(ReadOnly):
     conditions : dict of str to ndarray (experiments,)
         Conditions on which the means may depend, by name.
     scale : float
-        Scale s₀ of the prior exp(−s²/2s₀²)/√s of a spread s (standard deviation between experiments), in e-folds, or in
-        natural sizes of parameters of any sign.
+        Scale s₀ of the prior exp(−s²/2s₀²)/√s of a spread s. A spread is the standard deviation between experiments of
+        the logarithm of a positive parameter, or of another parameter over its typical size (0.01 for b).
     draws : Pooled
         Draws from the posterior, in the coordinates of `axes`.
     where : dict of str to float
-        Conditions to which means and new experiments refer, as set by `at`; the mean for other conditions.
+        Values, set by `at`, of the conditions to which means and new experiments refer; other conditions are at their
+        mean.
     """
 
     fits: Mapping[str, Fit]
@@ -81,7 +82,7 @@ class Population(ReadOnly):
 
     @property
     def kind(self) -> str:
-        """Text that names what a prediction from the population is about: another experiment."""
+        """Text that says to what a prediction from the population applies: another experiment."""
         return f"another experiment of a population{self._at}"
 
     @property
@@ -91,7 +92,7 @@ class Population(ReadOnly):
 
     @cached_property
     def axes(self) -> Axes:
-        """Coordinates: logarithms of positive parameters, natural sizes of others, a − b in place of the first b."""
+        """Coordinates: logarithms of positive parameters, other parameters over a typical size, a − b instead of b."""
         return Axes(self.fits, self.names)
 
     def at(self, where: Mapping[str, float]) -> Population:
@@ -140,26 +141,26 @@ class Population(ReadOnly):
         return self._estimate(one, one.value(self._mean))
 
     def experiment(self, label: str, name: str) -> Estimate:
-        """Parameter of one experiment, estimated together with the others."""
+        """Parameter of one experiment, estimated from all experiments together."""
         if label not in self.fits:
             raise ParameterError([Problem("label", f"got {label!r}; allowed: {', '.join(map(repr, self.fits))}")])
         one = self.axes[name]
         return self._estimate(one, one.value(self.draws.members[:, list(self.fits).index(label)]))
 
     def others(self, seed: int = 0) -> dict[str, Array]:
-        """Joint draws (m,) of all parameters of a new experiment on this rock, by name, at the conditions of `mean`."""
+        """Draws (m,) of the parameters of new experiments on this rock; draw k of all parameters is experiment k."""
         found = self.draws.another(seed) + self._shift
         return {name: one.value(found) for name, one in self.axes.quantities.items()}
 
     def another(self, name: str, seed: int = 0) -> Estimate:
-        """Parameter predicted for a new experiment on this rock, with all uncertainties; conditions as in `mean`."""
+        """Parameter of a new experiment on this rock at the conditions of `mean`, with all uncertainties."""
         one = self.axes[name]
         return self._estimate(one, one.value(self.draws.another(seed) + self._shift))
 
     def spread(self, name: str, level: float = 0.95) -> tuple[float, float, float]:
         """Standard deviation between experiments: median and ends of its central interval of probability `level`.
 
-        It is the standard deviation of the logarithm of a positive parameter; for others it is in SI units.
+        For a positive parameter, the standard deviation is that of the logarithm; for others, it is in SI units.
         """
         slopes = self.axes[name].gradient(self._mean)
         return _middle_and_ends(np.linalg.norm(slopes[:, None, :] @ self.draws.root, axis=(1, 2)), level)
@@ -239,12 +240,12 @@ class Population(ReadOnly):
 
     @property
     def weakening(self) -> float:
-        """Probability that a new experiment has b > a (b: sum of all b); NaN if these are not all parameters."""
+        """Probability that a new experiment has b > a (b: sum of all b); NaN if a or a b is not among them."""
         level = self.others().get(DIFFERENCE)
         return float("nan") if level is None else float(np.mean(level < 0))
 
     def alone(self, name: str) -> dict[str, Estimate | None]:
-        """Estimate of a parameter by each fit alone, by label; None for a fit that lacks or does not determine it."""
+        """Estimate of a parameter from each fit alone, by label; None if a fit lacks or does not determine it."""
         full = self.axes[name].name
         found = {label: next((e for e in (*one.estimates, *one.derived) if e.name == full), None)
                  for label, one in self.fits.items()}  # fmt: skip
@@ -275,7 +276,7 @@ class Population(ReadOnly):
         write_table(path, POPULATION, table, [store.to_dataset(one) for one in self.fits.values()])
 
     def plot(self, ax: Any = None) -> Any:
-        """Plot every parameter for each experiment, fitted alone and pooled, and for the population.
+        """Plot every parameter: for each experiment, from its fit alone and from all fits, and for the population.
 
         Returns
         -------
@@ -353,7 +354,7 @@ def _plain(one: Estimate) -> dict[str, float]:
 
 def _spread_words(found: tuple[float, float, float], one: MemberQuantity, mean: float) -> str:
     middle, low, high = found
-    if one.name == DIFFERENCE:  # whose mean may be 0
+    if one.name == DIFFERENCE:  # the mean of a − b may be 0
         return f"{format_quantity(middle, one.unit)} ({format_range(low, high, one.unit)})"
     middle, low, high = (100 * (np.expm1(x) if one.logarithmic else x / abs(mean)) for x in found)
     return f"{middle:.2g} % ({low:.2g} to {high:.2g} %)"
@@ -430,9 +431,9 @@ def population(
 ) -> Population:  # fmt: skip
     """Population of the parameters of several experiments, estimated from a fit to each of them.
 
-    Each fit enters with its estimates and their full covariance, as a normal likelihood of the logarithms of positive
-    parameters and of the values of others, with a − b in place of the first b. Differences between experiments may be
-    correlated. A parameter that an experiment does not determine is estimated from the others.
+    The estimates of each fit and their full covariance are used as a normal likelihood of the logarithms of positive
+    parameters and of the values of other parameters, with a − b in place of the first b. Differences between
+    experiments may be correlated. A parameter that an experiment does not determine is estimated from the others.
 
     Parameters
     ----------
@@ -445,8 +446,8 @@ def population(
         experiment, in their order or by label, such as ``{"temperature": {"p1": 20, "p2": 100, "p3": 250}}``; or
         ``"normal stress"`` for the normal stress of the records.
     scale : float
-        s₀ of the prior exp(−s²/2s₀²)/√s of a spread s, in e-folds (or natural sizes): with few experiments, it excludes
-        spreads that are implausibly large.
+        s₀ of the prior exp(−s²/2s₀²)/√s of a spread s of the logarithm of a parameter (or, if it may be negative, of
+        the parameter over its typical size). With few experiments, the prior excludes implausibly large spreads.
     count : int
         Number of draws.
     seed : int

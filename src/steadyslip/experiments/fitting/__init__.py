@@ -1,1 +1,1 @@
-"""From records and a rig to a fit: what drives it, the compiled model, starts, minimum, result."""
+"""Fits of a rig to records: loading of the model, the compiled model, starting points, search, and result."""

@@ -20,15 +20,15 @@ from steadyslip.experiments.fitting.valleys import along_open, along_valleys
 from steadyslip.experiments.loading.loading import raised, shifted
 from steadyslip.experiments.numerics.noise import STRUCTURE, Noise, describe, white, whiteness
 
-ARRIVED = 0.1  # a stopped search is at the minimum if its next step is shorter than this, in standard deviations
+ARRIVED = 0.1  # a stopped search is at a minimum if its next step is shorter than this many standard deviations
 F = TypeVar("F", bound=Fitted)
 
 
 def loading_shifts(plan: Plan, comparison: Comparison, z: Array) -> Iterator[Array]:
-    """Changes (n,) of the weighted model if an uncertain number of the loading changes by its standard error.
+    """Changes (n,) of the weighted model, each for one uncertain number of the loading changed by its standard error.
 
-    There is one array for each number: levels of normal stress, the measured motion of the load point, parameters of
-    its servo, and known initial states. There are none if the loading is not found in the records.
+    The uncertain numbers are levels of normal stress, the measured motion of the load point, parameters of its servo,
+    and known initial states. Nothing is returned if the loading is not found in the records.
     """
     if not plan.follows:
         return
@@ -57,7 +57,7 @@ def loading_shifts(plan: Plan, comparison: Comparison, z: Array) -> Iterator[Arr
 
 
 def spread_of_gradient(plan: Plan, comparison: Comparison, z: Array, rows: Array, noises: Sequence[Noise]) -> Array:
-    """Covariance (p, p) of Jᵀr for derivatives Jᵀ in `rows` (p, n), due to noise and to the uncertain loading."""
+    """Covariance (p, p) of Jᵀr, with derivatives Jᵀ in `rows` (p, n), due to noise and to the uncertain loading."""
     found = np.zeros((len(z), len(z)))
     for noise, where in zip(noises, comparison.slices, strict=True):
         found += noise.spread(rows[:, where])
@@ -70,10 +70,11 @@ def _is_minimum(
     comparison: DataComparison, z: Array, bounds: tuple[Array, Array], information: Array, gradient: Array,
     deviations: Array,
 ) -> bool:  # fmt: skip
-    """True if coordinates (p,) where a search ended are a minimum to within `ARRIVED` standard deviations.
+    """True if the coordinates `z` (p,) at which a search ended are within `ARRIVED` standard deviations of a minimum.
 
-    This is so if the next Gauss-Newton step is that short. The sum of squares has kinks where the time of a change
-    equals that of a sample; a time at a kink is held if the sum rises on both sides while the others follow.
+    The test is that the next Gauss-Newton step is shorter. The sum of squares has a kink where the time of a change
+    equals the time of a sample. A time at a kink is left out of the step if the sum of squares rises on both sides of
+    the kink.
     """
     free = (bounds[0] < z) & (z < bounds[1])
     ssq = float(np.sum(comparison.residuals(z[None])[0] ** 2))
@@ -104,8 +105,8 @@ def fit_with_errors(
     """Fit of the class `made` at the coordinates (p,) of a minimum, with errors, noise and undetermined parameters.
 
     Errors are infinite if few of many starts lead to the minimum and structure is left in the residuals, or if
-    residuals jump, as a better minimum may have been missed. Other starts ended at `ends` (m, p). If minima there fit
-    as well, parameters that differ between them are not determined; a better minimum there replaces the given one.
+    residuals jump, as a better minimum may have been missed. Other starts ended at `ends` (m, p). A better minimum near
+    them replaces `z`; if a minimum near them fits as well, the parameters that differ there are not determined.
     """
     r, jacobian = comparison.residuals(z[None])
     residuals, rows = r[0], jacobian[0]
@@ -134,7 +135,7 @@ def fit_with_errors(
             comparison, z, bounds, information, rows @ residuals, np.sqrt(np.diag(covariance))
         ):
             search = replace(search, converged=True)
-        else:  # the curvature elsewhere than at a minimum gives no errors
+        else:  # only the curvature at a minimum gives errors
             covariance = np.diag(np.full(free, np.inf))
     ssq, near = float(residuals @ residuals), np.empty((0, free))
     if search.converged:

@@ -17,16 +17,16 @@ class Beginning:
     Attributes
     ----------
     values : dict of str to float
-        Differences of friction and of each memory of it (e-folds), by name.
+        Differences of friction and of each of its memory variables (of their logarithm), by name.
     spread : tuple of tuple of float
-        Changes of all differences by one standard deviation, in independent directions.
+        For each of several independent directions: changes of all differences by one standard deviation.
     """
 
     values: dict[str, float]
     spread: tuple[tuple[float, ...], ...] = ()
 
     def of(self, names: Collection[str]) -> Beginning:
-        """Beginning with only the named differences: a nested law may have fewer memories."""
+        """Beginning with only the differences `names`, for a nested law with fewer memory variables."""
         kept = [name for name in self.values if name in names]
         places = [list(self.values).index(name) for name in kept]
         spread = tuple(tuple(row[k] for k in places) for row in self.spread)
@@ -37,6 +37,6 @@ class Beginning:
         return np.array([[*self.values.values()], *self.spread])
 
     def ends(self) -> Array:
-        """Differences (1 + directions, k): the known values, then one standard deviation away in each direction."""
+        """Differences (1 + directions, k): the known values, then a point one standard deviation away per direction."""
         known, *spread = self.rows()
         return np.array([known, *(known + own for own in spread)])

@@ -1,4 +1,4 @@
-"""Input tables of the kernels for commanded loading whose changes have free times and durations."""
+"""Input tables of the compiled models for commanded loading, in which times and durations of changes may be free."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from steadyslip.experiments.loading.loading import Change, Course, Loading, rest
 
 STRAIGHT_TOLERANCE = 5e-4  # largest deviation of straight lines from a curve, as a share of its range; chosen by trial
 MAX_PIECES = 30  # largest number of pieces into which an interval between samples is cut
-MIN_RAMP = 1e-9  # shortest ramp, as a share of the record: shorter ones are computed as steps of this length
+MIN_RAMP = 1e-9  # shortest duration of a ramp, as a share of the record; a step is computed as a ramp this long
 NORMAL, PORES = 2, 3  # columns of the inputs: normal stress and pore pressure
-SLIDING_SHARE = 1e-3  # duration of the steady sliding before a first rest, as a share of the record; any would do
+SLIDING_SHARE = 1e-3  # duration of steady sliding before an initial rest, as a share of the record; its value is free
 
 
 class CommandedInputs:
@@ -31,11 +31,11 @@ class CommandedInputs:
     pressed : bool
         True if the normal stress of the record drives the model.
     pores : bool
-        True if the contact has pores into which the pressure drains; otherwise pore pressure acts at once.
+        True if the contact has pores that the pressure reaches by drainage; otherwise pore pressure acts at once.
     lag : bool
         True to shift all changes by one free time.
     given : sequence of int
-        Indices in `free` of durations that are held in a fit: tables have no derivatives by them.
+        Indices in `free` of durations that are fixed in a fit: tables have no derivatives by them.
     """
 
     def __init__(
@@ -64,23 +64,23 @@ class CommandedInputs:
         self.nodes = self._nodes()
 
     def _ramps_of(self, change: int) -> list[int]:
-        """Indices in `ramps` of the ramps of one change; empty for −1."""
+        """Indices in `ramps` of the ramps that belong to the change with index `change`; empty for −1."""
         return [j for j, (i, _) in enumerate(self.ramps) if i == change]
 
     def _nodes(self) -> Array:
-        """Fixed nodes of the input table, s: both ends; samples along curves and along ramps of free duration."""
+        """Fixed nodes (s) of the input table: both ends, and samples along curves and along ramps of free duration."""
         if any(course.curve is not None for course in self.courses.values()):
             return np.union1d(self.time, self._cuts())
         held = np.zeros(len(self.time), dtype=bool)
         held[[0, -1]] = True
         for _, i, what in self.moved:
-            if what == "duration":  # derivatives in it are constant on each row
+            if what == "duration":  # derivatives by a duration are constant on each row of the table
                 change = self.changes[i][2]
                 held |= (self.time >= change.earliest) & (self.time <= change.latest + change.longest)
         return np.asarray(self.time[held])
 
     def _cuts(self) -> Array:
-        """Additional nodes, s, between samples where a curve deviates too much from straight lines."""
+        """Additional nodes (s) between samples, where a curve deviates too much from a straight line."""
         found = [np.empty(0)]
         spacing = np.diff(self.time)
         for course in self.courses.values():
@@ -99,7 +99,7 @@ class CommandedInputs:
 
     @cached_property
     def free(self) -> list[tuple[int, str]]:
-        """Free times in order: index of the change with ``at`` or ``duration``; then -1 with ``lag`` and ``hold``."""
+        """Free times: pairs of a change's index and ``at`` or ``duration``, then of -1 and ``lag`` or ``hold``."""
         found = []
         for i, (_, _, change) in enumerate(self.changes):
             found += [(i, "at")] if change.free else []
@@ -110,7 +110,7 @@ class CommandedInputs:
     def table_of(self, times: Array, loads: Sequence[Course]) -> InputTable:
         """Input table (loads, ...) for values of the free times (free,) and several courses of the load point.
 
-        The courses may differ in levels and in the shares of pieces only.
+        The courses may differ only in their levels and in the shares of their ramps.
         """
         return _ManyLoads(self, loads).table(np.tile(times, (len(loads), 1)))
 
@@ -126,12 +126,12 @@ class CommandedInputs:
 
     @cached_property
     def moved(self) -> list[tuple[int, int, str]]:
-        """Free times by which tables have derivatives, as (index among the values, items as in `free`)."""
+        """Free times by which tables have derivatives: index in `free`, then the two items of the pair in `free`."""
         return [(k, i, what) for k, (i, what) in enumerate(self.free) if k not in self.given]
 
     @cached_property
     def _times_of_ramps(self) -> Array:
-        """Rows (3, ramps) of the time of each ramp's change (s), the ramp's begin after it (s) and its duration (s)."""
+        """Rows (3, ramps): time of the change of each ramp (s), begin of the ramp after this time (s), duration (s)."""
         return (
             np.array([(self.changes[i][2].time, since, length) for i, (since, length, _) in self.ramps])
             .reshape(-1, 3)
@@ -140,12 +140,12 @@ class CommandedInputs:
 
     @cached_property
     def _ending(self) -> Array:
-        """Indices of ramps with a duration, whose ends are nodes too."""
+        """Indices of the ramps that have a duration, so that their ends are nodes as well."""
         return np.flatnonzero(self._times_of_ramps[2] > 0)
 
     @cached_property
     def _moves(self) -> Array:
-        """Derivatives (moved, nodes) by free times of nodes that are no samples: ends of ramps, then of a hold."""
+        """Derivatives (moved, nodes) by free times, of the nodes at the ends of ramps and of a hold."""
         ending = self._ending
         ramps = len(self.ramps) + len(ending)
         found = np.zeros((len(self.moved), ramps + (2 if self.resting is not None else 0)))
@@ -175,7 +175,7 @@ class CommandedInputs:
         low, high = float(self.time[0]), float(self.time[-1])
         events = np.hstack([begins, (begins + lengths)[:, self._ending]])
         before = np.empty((jobs, 0))
-        if self.resting is not None:  # steady sliding, then a hold that ends where the record begins
+        if self.resting is not None:  # steady sliding, then a hold until the record begins
             before = low - times[:, -1:] - np.array([[SLIDING_SHARE * (high - low), 0.0]])
         nodes = np.hstack([np.clip(events, low, high), before, np.tile(self.nodes, (jobs, 1))])
         order = np.argsort(nodes, axis=1, kind="stable")  # a step sorts before a sample at the same time
@@ -203,7 +203,7 @@ class CommandedInputs:
         return {name: course.curve(self.nodes) for name, course in self.courses.items() if course.curve is not None}
 
     def _curve_values(self, channel: str, moving: Array, order: Array) -> Array:
-        """Values of a smooth curve at all nodes, sorted by `order`: free times (jobs, k), then the fixed nodes."""
+        """Values of a smooth curve at the nodes `moving` (jobs, k) and at the fixed nodes, sorted by `order`."""
         curve = self.courses[channel].curve
         if curve is None:
             raise InternalError(f"the {channel} has no curve")
@@ -242,7 +242,7 @@ class CommandedInputs:
             rows[:, :, 3 + self.inputs + column] += sign * slope
 
     def _first(self, channel: str) -> Array:
-        """First level, (jobs or 1, 1)."""
+        """First level (jobs or 1, 1) of a channel."""
         return np.array([[self.courses[channel].first]])
 
     def _heights(self, channel: str) -> Array:
@@ -251,11 +251,11 @@ class CommandedInputs:
         return np.array(found).reshape(1, -1)
 
     def _rates_before_rest(self) -> Array | float | None:
-        """Rate of the load point before the hold with which the record begins, m/s; (jobs,) or the same for all."""
+        """Rate (m/s) before an initial hold: one number, or an array (jobs,); None without a hold."""
         return self.resting
 
     def _input_rates(self, nodes: Array, begins: Array, lengths: Array, first: int, directions: int) -> Array:
-        """Derivatives (jobs, directions, rows, inputs) of the inputs at fixed times by the free times of ramps."""
+        """Derivatives (jobs, directions, rows, inputs), at fixed time, of the inputs by the free times of ramps."""
         if not any(ramped > 0 for _, (_, ramped, _) in self.ramps):
             return np.zeros((1, 0, 0, self.inputs))
         middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
@@ -275,7 +275,7 @@ class CommandedInputs:
 
 
 class _ManyLoads(CommandedInputs):
-    """Input tables for several courses of the load point, one for each job, that differ in levels and shares only."""
+    """Input tables for several courses of the load point, one per job, that differ only in levels and shares."""
 
     def __init__(self, like: CommandedInputs, loads: Sequence[Course]) -> None:
         self.__dict__.update(vars(like))
@@ -302,7 +302,7 @@ class _ManyLoads(CommandedInputs):
 
 
 def time_windows(changes: list[tuple[str, int, Change]]) -> list[tuple[float, float, float]]:
-    """Starting value, smallest and largest value (s) of each free time or duration of the changes."""
+    """Starting value, smallest value and largest value (s) of each free time or duration of the changes."""
     found = []
     for _, _, change in changes:
         if change.free:

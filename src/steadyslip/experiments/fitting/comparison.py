@@ -1,4 +1,4 @@
-"""Residuals of the records and their derivatives in the free parameters, for many parameter sets at once."""
+"""Residuals of the records and their derivatives by the free parameters, for many parameter sets at once."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
 CACHED_POINTS = 6  # number of points whose model results are cached
-MAX_CACHED_SAMPLES = 200_000  # results with more samples in all are not cached, to save memory
+MAX_CACHED_SAMPLES = 200_000  # results of fits with more samples are not cached, to save memory
 
 
 @dataclass(frozen=True, eq=False)
 class RecordPart:
-    """Record with the model with which it is compared.
+    """Record, and the model with which it is compared.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class RecordPart:
     forward : Forward
         Compiled model.
     inputs : CommandedInputs, MeasuredInputs or ProtocolInputs
-        Source of the input tables.
+        Object that makes the input tables of the model.
     data : ndarray (n,)
         Observed friction coefficient.
     weights : ndarray (n,)
@@ -46,7 +46,7 @@ class RecordPart:
     rig_indices, time_indices, begin_indices, trend_indices : tuple of int
         Indices of the rig's parameters, free times, initial states and trend coefficients among the unknowns.
     given_indices : tuple of int
-        Indices of free times that are held in a fit: the model has no derivatives by them.
+        Indices of free times that are fixed in a fit: the model has no derivatives by them.
     trend : ndarray (terms, n)
         Factors of the trend coefficients.
     known_begin : tuple of float
@@ -95,7 +95,7 @@ class RecordPart:
         )
 
     def states(self, values: Array) -> dict[str, Array]:
-        """Friction without a trend, and each memory variable of it, (m, n) at values (m, p) of the unknowns."""
+        """Friction (m, n) without a trend, and each memory variable (m, n), at values (m, p) of the unknowns."""
         own, table, begin = values[:, list(self.rig_indices)], self.table(values, sensitive=False), self.begin(values)
         memories = [item.name for item in self.forward.model.memory if item.unit == "1"]
         models = {"friction": self.without_derivatives} | {name: self._observing(name) for name in memories}
@@ -110,7 +110,7 @@ class RecordPart:
     def driven_by(self, values: Array, loads: Sequence[Course]) -> Array:
         """Friction (loads, n) without a trend at values (p,) of the unknowns, for several courses of the load point.
 
-        The times of changes are those of the unknowns. All are run at once, without derivatives.
+        The times of changes are those in `values`. All courses are run at once, without derivatives.
         """
         if not isinstance(self.inputs, CommandedInputs):
             raise InternalError("only the commanded loading has other courses")
@@ -152,14 +152,14 @@ class DataComparison:
         self._recent: deque[tuple[bytes, Array, Array]] = deque(maxlen=CACHED_POINTS)
 
     def _run(self, coordinates: Array) -> tuple[Array, Array]:
-        """Model (m, n) and derivatives (m, p, n), computed."""
+        """Model (m, n) and derivatives (m, p, n) at coordinates (m, p), computed without the cache."""
         raise NotImplementedError
 
     def model(self, coordinates: Array) -> tuple[Array, Array]:
         """Model (m, n) and derivatives (m, p, n) at coordinates (m, p), not weighted; read-only arrays.
 
         Results of single points are cached, so that errors at a minimum need no further run. Results of several points
-        at once are not: a motion that is completed among others may fail if it is run alone.
+        are not cached: a motion that is completed together with others may fail if it is run alone.
         """
         if len(coordinates) == 1:
             for point, own, slopes in self._recent:
@@ -171,7 +171,7 @@ class DataComparison:
         return predicted, jacobian
 
     def residuals(self, coordinates: Array, data: Array | None = None) -> tuple[Array, Array]:
-        """Weighted residuals (m, n), data minus model, and derivatives (m, p, n) of the model, both scaled by the loss.
+        """Weighted residuals (m, n), data minus model, and derivatives (m, p, n) of the model; the loss scales both.
 
         Parameters
         ----------
@@ -238,7 +238,7 @@ class Comparison(DataComparison):
 
 
 def scaled_by_loss(loss: str, r: Array, width: float) -> tuple[Array, Array]:
-    """Scaled residuals whose squares are the loss of residuals `r`, and their derivatives by `r`; of the same shape."""
+    """Scaled residuals, whose squares are the loss of the residuals `r`, and their derivatives by `r`."""
     z = np.maximum((r / width) ** 2, 1e-20)
     with np.errstate(all="ignore"):
         if loss == "soft-l1":
@@ -281,7 +281,7 @@ MIN_HOLD, MAX_HOLD = 1e-3, 1e5  # bounds of the hold before a record that begins
 
 
 def start_unknowns(record: int | None, loading: Loading, span: float, lag: bool) -> list[Unknown]:
-    """Unknowns of a record: lag (s) of friction behind the loading, hold (s) before it if it begins at rest."""
+    """Unknowns of a record: lag (s) of friction behind the loading; duration (s) of a hold before a record at rest."""
     label = "" if record is None else f"@{record + 1}"
     found = []
     if lag:
@@ -294,11 +294,11 @@ def start_unknowns(record: int | None, loading: Loading, span: float, lag: bool)
     return found
 
 
-MAX_INITIAL = 30.0  # largest initial difference from steady sliding, in natural sizes (e-folds of a state)
+MAX_INITIAL = 30.0  # largest initial difference from steady sliding: of ln(state), or of friction over 0.01
 
 
 def initial_unknowns(record: int | None, sizes: dict[str, float]) -> list[Unknown]:
-    """Unknown initial differences from steady sliding, of friction and of each state, within natural sizes."""
+    """Unknown initial differences from steady sliding, of friction and of each state; `sizes` are typical sizes."""
     label = "" if record is None else f"@{record + 1}"
     return [
         Unknown(
@@ -318,7 +318,7 @@ def trend_unknowns(record: int | None, order: int, offset: bool) -> list[Unknown
 def trend_rows(record: Record, order: int, offset: bool, axis: str, moved: Array | None = None) -> Array:
     """Factors (terms, n) of the trend coefficients: powers of the elapsed share of the displacement, or of the time.
 
-    `moved` is the commanded displacement (m) if it is known; it replaces the measured one.
+    `moved` is the commanded displacement (m) if it is known; it replaces the measured displacement.
     """
     driven = record.displacement if moved is None else moved
     along: Any = record.time if axis == "time" or driven is None else driven

@@ -1,10 +1,10 @@
-"""Condensed least squares: the sum of squares over all samples, computed from the model at a few of them.
+"""Condensed least squares: the sum of squares over all samples, computed from the model at a few of the samples.
 
-Between changes of the loading, the friction of the model is a smooth curve, which a polynomial through a few samples
-gives at all others. The sum of squares over all samples then equals a sum over these few, with transformed data and
-weights, plus a constant. The noise is averaged as before, and the model is computed at far fewer samples. Around the
-changes, whose times are free, all samples are kept. The constants were chosen by trial; they trade accuracy against
-time.
+Between changes of the loading, the friction of the model is a smooth curve: a polynomial through a few samples gives it
+at all other samples. The sum of squares over all samples then equals a sum over these few samples, with transformed
+data and weights, plus a constant. The noise is averaged as in the whole sum, but the model is computed at far fewer
+samples. Around changes, whose times are free, all samples are kept. The constants were chosen by trial as a compromise
+between accuracy and time.
 """
 
 from __future__ import annotations
@@ -24,21 +24,22 @@ from steadyslip.experiments.loading.loading import Loading
 
 NODES = 7  # nodes of each polynomial (degree 6)
 INTERPOLATION_ERROR = 1e-3
-"""Largest interpolation error: relative to the residuals' scatter (model) or to the largest value (derivatives)."""
+"""Largest interpolation error, relative to the scatter of the residuals for the model, and to the largest value for its
+derivatives."""
 MAX_KEPT_SHARE = 0.5  # samples are condensed if at most this share of them remains
 MAX_REFERENCES = 3  # number of motions from which the nodes are chosen
 MARGIN = 2  # samples kept on both sides of the window of a change
 
 
 class Condensed:
-    """Comparison that computes the model at few samples and has the sum of squares of all, near given coordinates.
+    """Comparison that computes the model at few samples but has the sum of squares of all, near given coordinates.
 
     Parameters
     ----------
     plan : Plan
         Plan with linear loss and commanded (or smoothed) loading.
     whole : Comparison
-        Comparison of that plan on all samples.
+        Comparison of the plan on all samples.
     predicted, slopes : ndarray (m, n), (m, p, n)
         Model friction and derivatives at the reference coordinates, the best first; not weighted.
     """
@@ -57,7 +58,7 @@ class Condensed:
         self.size = sum(len(piece.rows) for piece in self.pieces)
         records = tuple(r.taken(p.rows, "thinned") for r, p in zip(plan.records, self.pieces, strict=True))
         effort = whole.parts[0].forward.effort
-        longer = replace(effort, patience=effort.patience * whole.size // self.size)  # same steps over fewer rows
+        longer = replace(effort, patience=effort.patience * whole.size // self.size)  # as many steps on fewer rows
         self.few = replace(plan, records=records, weights=None).comparison(longer)
         self.data, constant = [], 0.0
         for piece, where in zip(self.pieces, whole.slices, strict=True):
@@ -112,7 +113,7 @@ def _kept_ranges(time: Array, loading: Loading, pressed: bool) -> Iterator[tuple
 
 @dataclass(eq=False)
 class _Element:
-    """Range of samples, first to last, with weights (samples, nodes) of the polynomial through its nodes."""
+    """Range of samples, and weights (samples, nodes) that interpolate values at its nodes to all of its samples."""
 
     first: int
     last: int
@@ -162,7 +163,7 @@ class _Interpolation:
                 waiting += [(i, (i + j) // 2), ((i + j) // 2, j)]
 
     def _interpolate(self, values: Array) -> Array:
-        """Interpolate values at the kept samples to all samples."""
+        """Values at all samples, interpolated from values at the kept samples."""
         found = np.zeros(len(self.kept))
         found[self.rows] = values
         for one in self.elements:
@@ -170,7 +171,7 @@ class _Interpolation:
         return found
 
     def _transpose(self, values: Array) -> Array:
-        """Transpose of `_interpolate`: values at all samples to sums at the kept ones."""
+        """Sums at the kept samples of values at all samples: the transpose of the linear map `_interpolate`."""
         found = np.zeros(len(self.rows))
         own = self.kept.copy()
         for one in self.elements:
@@ -181,7 +182,7 @@ class _Interpolation:
         return found
 
     def weigh(self, weights: Array) -> None:
-        """Compute the banded Cholesky factor that gives kept samples the weight of all samples."""
+        """Compute the banded Cholesky factor with which the kept samples have the weight of all samples."""
         squares, own = weights**2, self.kept.copy()
         band = np.zeros((NODES, len(self.rows)))
         for one in self.elements:
@@ -205,7 +206,8 @@ class _Interpolation:
     def condensed(self, data: Array, weights: Array, predicted: Array) -> tuple[Array, float]:
         """Transformed data at the kept samples, and the constant part of the sum of squares.
 
-        Computed as a difference from model friction `predicted` at the kept samples, which reduces rounding errors.
+        Both are computed for the difference of the data from model friction `predicted` at the kept samples, which
+        reduces rounding errors.
         """
         rest = weights * (data - self._interpolate(predicted))
         gathered = self._transpose(weights * rest)

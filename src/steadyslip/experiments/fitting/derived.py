@@ -17,19 +17,20 @@ from steadyslip.machine.slider import Slider
 
 DERIVED = ("a - b", "k_c", "k/k_c", "k/k_cal")
 TOGETHER = 0.1
-"""Largest error (e-folds or natural sizes) of a quantity that is given although its parameters are not determined."""
-SIZE = 0.01  # natural size of a - b, as of b
-LIKELY = 1.96  # distance of points that fit as well, in standard deviations: 95 %
+"""A derived quantity is given although its parameters are not determined if its own error (of the logarithm, or over
+`SIZE`) is at most this large."""
+SIZE = 0.01  # typical size of a - b, and of b
+LIKELY = 1.96  # half the width of a 95 % interval, in standard deviations: points within it fit as well
 STEP = 1e-2  # step of finite differences, in standard deviations: far above rounding, with little effect of curvature
-LARGEST = 1e-2  # largest standard deviation, in e-folds, for a step: those along open directions are too large
+LARGEST = 1e-2  # larger standard deviations (of coordinates) are limited to this size for a step
 
 
 @dataclass(frozen=True)
 class Minimum:
     """Minimum of a fit: coordinates (p,) in `space`, their covariance (p, p), and degrees of freedom.
 
-    `joint` holds errors of quantities that the data determine although not all their parameters, by name and record;
-    see `joint_errors`.
+    `joint` holds, by name, errors of derived quantities that the data determine although they do not determine all
+    parameters of these quantities; see `joint_errors`.
     """
 
     space: Space
@@ -40,12 +41,12 @@ class Minimum:
 
     @property
     def deviations(self) -> Array:
-        """Standard deviations (p,) of the coordinates, inf for those that are not determined."""
+        """Standard deviations (p,) of the coordinates, inf for coordinates that are not determined."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def steps(self) -> Array:
-        """Steps (p,) of the coordinates for finite differences, 0 for those that are not determined."""
+        """Steps (p,) of the coordinates for finite differences, 0 for coordinates that are not determined."""
         return STEP * np.where(np.isfinite(self.deviations), np.minimum(self.deviations, LARGEST), 0.0)
 
     @property
@@ -69,7 +70,7 @@ def derived_estimates(
     rigs : sequence of Slider
         Rig of each record, with its rate and normal stress.
     calibrated : float, optional
-        Stiffness of the machine from a calibration, Pa/m; ``k/k_cal`` is the ratio of the fitted stiffness to it.
+        Stiffness of the machine from a calibration, Pa/m, by which the fitted stiffness is divided in ``k/k_cal``.
     """
     found: dict[str, list[Estimate]] = {}
     for record, rig in enumerate(rigs):
@@ -86,8 +87,8 @@ def derived_estimates(
 class _Derived:
     """Values (m,) of a derived quantity, with the names of the parameters that it depends on (`needed`).
 
-    If `logarithmic`, errors are those of its logarithm. `levels` are the names of a and all b, whose difference steady
-    sliding determines.
+    If `logarithmic`, errors are those of the logarithm of the quantity. `levels` are the names of a and all b: steady
+    sliding determines their difference even if it determines none of them.
     """
 
     name: str
@@ -148,12 +149,12 @@ def _of_rig(space: Space, rig: Slider, record: int, calibrated: float | None, pl
 def joint_errors(
     minimum: Minimum, rigs: Sequence[Slider], calibrated: float | None, lost: set[str], near: Array
 ) -> dict[str, float]:
-    """Standard deviations of derived quantities that need an undetermined parameter (in `lost`), by name.
+    """Standard deviations, by name, of derived quantities that depend on an undetermined parameter (in `lost`).
 
-    The data may determine ``a - b`` although neither a nor b, and then also k_c if they determine the slip distance.
-    An error includes the change of the quantity at other points `near` (m, p) that fit as well; quantities with a large
-    error are left out. Standard deviations of positive quantities are those of the logarithm. Names end with ``@1`` and
-    so on.
+    The data may determine ``a - b`` although they determine neither a nor b; if they determine the slip distance, they
+    then also determine k_c. An error includes the change of the quantity at other points `near` (m, p) that fit as
+    well; quantities with a large error are left out. Standard deviations of positive quantities are those of the
+    logarithm. Names end with ``@1`` and so on.
     """
     found = {}
     for record, rig in enumerate(rigs):
@@ -188,7 +189,7 @@ def _of_record(minimum: Minimum, rig: Slider, record: int, calibrated: float | N
 
 
 def _counted(one: _Derived, values: Array) -> Array:
-    """Values (m,), or their logarithms if errors refer to these; inf if undefined."""
+    """Values (m,), or their logarithms for a quantity whose errors are those of the logarithm; inf if undefined."""
     with np.errstate(all="ignore"):
         found = np.log(values) if one.logarithmic else values
     return np.where(np.isfinite(found), found, np.inf)
@@ -207,7 +208,7 @@ def _error(minimum: Minimum, one: _Derived, name: str) -> float:
 
 
 def _estimate(minimum: Minimum, area: float | None, one: _Derived, error: float) -> Estimate:
-    """Estimate of a quantity from `_at_minimum`; `error` is the standard deviation, of the logarithm if positive."""
+    """Estimate of a quantity from `_at_minimum` with standard deviation `error` (of the logarithm if `logarithmic`)."""
     from scipy.stats import t
 
     value = float(one.values[0])

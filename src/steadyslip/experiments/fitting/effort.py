@@ -1,4 +1,4 @@
-"""Limits on the work of a fit, counted in integration steps, so that fits are the same on every computer.
+"""Limits on the work of a fit, counted in integration steps so that results are the same on every computer.
 
 The limits were chosen by trial so that nearly all fits converge within them; larger limits cost time in fits whose
 model cannot follow the record.
@@ -13,17 +13,17 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.kernels.experiment import LANES
 
-MAX_STEPS_PER_ROW = 40  # integration steps per row of the input table, on average, before a motion is given up
+MAX_STEPS_PER_ROW = 40  # a motion is given up after this many integration steps per row of the input table, on average
 MIN_WORK = 6e7  # units of work (see `Budget`) that the search of one model may use, however short its records
-PASSES = 1000.0  # further work, in passes over all samples with one step each, for the search of one model
-MODELS = 5.0  # work of one fit, nested models included, as a multiple of that of one search
+PASSES = 1000.0  # further work for the search of one model: this many integrations with one step per sample
+MODELS = 5.0  # largest work of one fit, nested models included, as a multiple of the work of one search
 
 
 class Budget:
-    """Budget of work, and the work that is spent.
+    """Work that a fit may do, and work that it has done.
 
-    Eight motions are integrated side by side, one per SIMD lane. One unit of work is one step of the slowest of them,
-    for each number that a motion carries (state variables and their derivatives).
+    Eight motions are integrated at a time, one in each SIMD lane. One step of the slowest of them counts as one unit of
+    work for each number that is integrated in a motion (state variables and their derivatives).
 
     Parameters
     ----------
@@ -38,23 +38,23 @@ class Budget:
 
     @classmethod
     def of_fit(cls, samples: int, unknowns: int, scale: float = 1.0) -> Budget:
-        """Budget of a fit with a number of samples and unknowns."""
+        """Budget of a fit with the given numbers of samples and unknowns."""
         return cls(MODELS * scale * work_of_search(samples, unknowns), scale)
 
     def spend(self, steps: Array, carried: int) -> None:
-        """Add the work of motions that took `steps` (jobs,) and carried a number of values each."""
+        """Add the work of motions that took `steps` (jobs,), each with `carried` integrated numbers."""
         groups = np.zeros(-(-len(steps) // LANES) * LANES)
         groups[: len(steps)] = steps
         self.spent += float(np.sum(np.max(groups.reshape(-1, LANES), axis=1, initial=0.0))) * carried
 
     def part(self, work: float) -> Allowance:
-        """Allowance of `work` units from now on, or of the rest of the budget if that is less."""
+        """Allowance of `work` further units, or of the rest of the budget if that is less."""
         return Allowance(self, min(self.spent + work, self.total))
 
 
 @dataclass(eq=False)
 class Allowance:
-    """Part of a budget; calling it returns True once it is spent.
+    """Part of a budget; a call of the allowance returns True once this part is spent.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Allowance:
     end : float
         Value of ``budget.spent`` at which the allowance is spent.
     was_met : bool
-        True once a call has returned True, that is, a computation was ended early.
+        True once a call has returned True, which ends a computation early.
     """
 
     budget: Budget
@@ -84,9 +84,9 @@ class Effort:
     threads : int or None
         Number of threads; all cores if None.
     patience : int
-        Steps per row of the input table, on average, before a motion is given up.
+        A motion is given up after this number of steps per row of the input table, on average.
     growth : float
-        Steps before a motion is given up, as a multiple of those of the slowest motion that was completed.
+        A motion is given up after this multiple of the steps of the slowest motion that was completed.
     budget : Budget
         Budget of the fit to which the runs belong.
     """

@@ -1,4 +1,4 @@
-"""Other minima that fit the records as well as the best: parameters that differ between them are not determined."""
+"""Minima that fit the records as well as the best minimum: parameters that differ between them are not determined."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from steadyslip.experiments.fitting.search import ROUGH_ITERATIONS
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
-AS_GOOD = 3.84  # a fit is as good up to this rise of -2 log likelihood: 95 %
-FAR = 4.0  # a parameter is undetermined if it differs by this number of errors: they are far too small then
-NEAR = 1.0  # smaller differences, in errors, are ignored: they would widen an interval by less than an eighth
-APART = 2.5  # an end of the search is apart from the best minimum if a coordinate differs by this number of errors
+AS_GOOD = 3.84  # a minimum fits as well if -2 log likelihood exceeds the least by no more than this (95 %)
+FAR = 4.0  # a parameter that differs by more standard errors is undetermined: its error is far too small
+NEAR = 1.0  # differences of fewer standard errors are ignored: they would widen an interval by less than an eighth
+APART = 2.5  # an end of the search is near another minimum if a coordinate differs by more standard errors than this
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,19 +29,19 @@ class EqualMinimum:
     space : Space
         Unknowns of the model that has this minimum.
     moved : ndarray (p,)
-        Differences of its coordinates from those of the best minimum.
+        Coordinates of this minimum minus those of the best minimum; both have the unknowns of `space`.
     """
 
     space: Space
     moved: Array
 
     def shift(self, space: Space) -> Array:
-        """Differences (p,) of the coordinates in `space` from those of the best minimum; 0 for times."""
+        """Differences (p,) from the best minimum in the coordinates of `space`; 0 for times."""
         moved = {u.name: x for u, x in zip(self.space.unknowns, self.moved, strict=True) if not is_time(u)}
         return np.array([moved.get(u.name, 0.0) for u in space.unknowns])
 
     def far(self, space: Space, deviations: Array, errors: float = FAR) -> Array:
-        """Mask (p,) of the unknowns in `space` that differ by more than `errors` deviations or have an infinite one."""
+        """Mask (p,) of unknowns in `space` that differ by more than `errors` deviations or have no finite deviation."""
         own = np.abs(self.shift(space))
         return np.asarray((own > LEAST_CHANGE) & ((own > errors * deviations) | ~np.isfinite(deviations)))
 
@@ -49,7 +49,7 @@ class EqualMinimum:
 def ends_beside(
     comparison: DataComparison, z: Array, ends: Array, bounds: tuple[Array, Array], covariance: Array, most: float
 ) -> Minima:  # fmt: skip
-    """Minima outside the errors of the best, with a sum of squares up to `most`, the best first.
+    """Minima outside the errors of the best minimum, with a sum of squares up to `most`, sorted by it.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def _apart(space: Space, moved: Array, covariance: Array) -> Array:
 def opened(
     space: Space, covariance: Array, minima: Sequence[EqualMinimum]
 ) -> tuple[Array, tuple[Combination, ...]]:  # fmt: skip
-    """Covariance (p, p) widened by minima that fit as well, and the combination that they make undetermined.
+    """Covariance (p, p) widened to include minima that fit as well, and the combination that they leave undetermined.
 
     The 95 % interval of each parameter includes its value at the minimum that differs most; parameters that differ much
     more have an infinite variance.
@@ -94,7 +94,7 @@ def opened(
     space : Space
         Unknowns of the best minimum.
     covariance : ndarray (p, p)
-        Covariance of their coordinates.
+        Covariance of the coordinates at the best minimum.
     minima : sequence of EqualMinimum
     """
     deviations = np.sqrt(np.diag(covariance))

@@ -62,7 +62,7 @@ class Estimate(Displayed):
 
     @property
     def undetermined(self) -> str:
-        """Text in place of an infinite error."""
+        """Text that is shown in place of an infinite error."""
         if not self.ended:
             return "no error: the search was stopped before it ended"
         together = f" (with {', '.join(self.along)})" if self.along else ""
@@ -75,13 +75,14 @@ class Estimate(Displayed):
         return format_range(self.low, self.high, self.unit, self.area)
 
 
-UNDETERMINED = 0.5  # a direction is open (undetermined) above this standard deviation, in e-folds or natural sizes
-MIN_WEIGHT = 0.15  # least weight of a parameter named in a combination; smaller ones only lengthen the message
+# coordinates are logarithms of positive parameters, and other parameters over a typical size (0.01 of b, 0.2 of α)
+UNDETERMINED = 0.5  # data leave a direction open (undetermined) if its standard deviation in coordinates is larger
+MIN_WEIGHT = 0.15  # a combination names parameters of at least this weight: more names would only lengthen the message
 MIN_CHANGE = 0.1  # a parameter is also named if one standard deviation along the direction changes it by this much
-LEAST_CHANGE = 0.01  # least change of a parameter along an open direction that makes it undetermined; e-folds or sizes
-MOST_REACH = 2.0  # largest change along an open direction, in e-folds or natural sizes: more is not plausible
-OPEN_SHARE = 0.1  # an open direction makes a parameter undetermined from this share of its variance (.3 of its error)
-EIGENVALUE_ROUNDING = 1e-13  # eigenvalues of the scaled information below this share of the largest are rounding errors
+LEAST_CHANGE = 0.01  # an open direction makes a parameter undetermined if it changes its coordinate by more than this
+MOST_REACH = 2.0  # largest change of a coordinate along an open direction: more is not plausible
+OPEN_SHARE = 0.1  # an open direction makes a parameter undetermined if it has more than this share of its variance
+EIGENVALUE_ROUNDING = 1e-13  # eigenvalues of the scaled JᵀJ below this share of the largest are rounding errors
 DERIVATIVE_ROUNDING = 1e-10  # derivatives below this share of the largest are rounding errors of the integration
 
 
@@ -92,10 +93,10 @@ class Combination:
     Attributes
     ----------
     weights : dict of str to float
-        Relative change of each parameter, in e-folds (positive parameters) or natural sizes (0.01 of b, 0.2 of α);
-        the largest is 1.
+        Change of each parameter relative to the largest change, which is 1: of the logarithm of a positive parameter,
+        or of another parameter over its typical size (0.01 of b, 0.2 of α).
     deviation : float
-        Standard deviation along the direction, in e-folds or natural sizes; inf if the records give no bound.
+        Standard deviation of the parameter with the largest change, in the same measure; inf without a bound.
     """
 
     weights: dict[str, float]
@@ -111,10 +112,10 @@ class Combination:
 
 
 def whole_covariance(information: Array, spread: Array) -> Array:
-    """Covariance (p, p) of the coordinates, finite also for those that `combinations` leaves without an error.
+    """Covariance (p, p) of the coordinates, finite also for coordinates that `combinations` leaves without an error.
 
-    Along directions that the data hardly determine, the deviation is limited to `MOST_REACH`: larger numbers would hide
-    the others behind rounding errors.
+    Along directions that the data hardly determine, the deviation is limited to `MOST_REACH`: the rounding errors of
+    larger numbers would hide the other deviations.
     """
     values, directions, known = _directions(information)
     largest = np.max(np.abs(directions), axis=0)
@@ -127,7 +128,7 @@ def whole_covariance(information: Array, spread: Array) -> Array:
 
 
 def _directions(information: Array) -> tuple[Array, Array, Array]:
-    """Information (p,) on independent directions, the directions (p, p) as columns, and mask (p,) of usable ones."""
+    """Information (p,) on independent directions, the directions (p, p) as columns, and mask of usable directions."""
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     insensitive = size <= DERIVATIVE_ROUNDING * max(float(size.max(initial=0.0)), 1e-300)
     scale = np.where(insensitive, 1.0, size)
@@ -181,12 +182,12 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
 
 
 def is_time(one: Unknown) -> bool:
-    """True for times of changes: samples on both sides bound them, whatever the other parameters are."""
+    """True for the time of a change, which samples on both sides bound whatever the other parameters are."""
     return one.parameter.startswith(("jump.", "step."))
 
 
 def combination(direction: Array, deviation: float, space: Space, lost: Array) -> Combination:
-    """Combination of parameters along a direction (p,): those in the mask `lost` (p,), and those that change much."""
+    """Combination of parameters along a direction (p,): those in the mask `lost` (p,), and others that change much."""
     weights = direction / direction[np.argmax(np.abs(direction))]
     least = min(MIN_WEIGHT, max(MIN_CHANGE / deviation, 0.01))
     order = [i for i in np.argsort(-np.abs(weights)) if lost[i] or abs(weights[i]) >= least]
@@ -196,9 +197,9 @@ def combination(direction: Array, deviation: float, space: Space, lost: Array) -
 def prior_information(space: Space) -> Array:
     """Prior information (p, p) on times of changes, as inverse variances from the windows in which they are searched.
 
-    A time that the data do not determine ends at an end of its window, which is half its width (1/2 in coordinates)
-    from the middle; this distance is taken as standard deviation. A uniform distribution has a third of its variance,
-    but errors would then be too small, because the search does not use it.
+    The search leaves a time that the data do not determine at an end of its window, half a width of the window (1/2 in
+    coordinates) from the middle; this distance is taken as the standard deviation. A uniform distribution over the
+    window has a third of this variance, but errors would be too small with it, as the search does not use a prior.
     """
     known = np.zeros((len(space), len(space)))
     for i, one in enumerate(space.unknowns):

@@ -35,9 +35,9 @@ from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
-MAX_WIDTHS = 6  # most widths of a robust loss that are tried
-LEAST_NARROWING = 0.8  # a new width is used if it is below this share of the last; chosen by trial, to save searches
-MIN_GAIN = 1e-6  # least relative decrease of the sum of squares that replaces a minimum; searches end within 1e-7
+MAX_WIDTHS = 6  # largest number of widths of a robust loss that are tried one after the other
+LEAST_NARROWING = 0.8  # a new width is used if it is below this share of the last width; chosen by trial, to save time
+MIN_GAIN = 1e-6  # a minimum is replaced if another is lower by this relative amount; searches are accurate to 1e-7
 
 
 @checked()  # the options are checked as `FitSettings`, which files use too
@@ -69,33 +69,33 @@ def fit(
 
     The model of a slider is driven by the commanded loading, as found in the record: constant rates of the load point
     with changes at fitted times, and a normal stress that is constant or smooth between its changes. The motion begins
-    with steady sliding at the first sample. If a record begins at rest, it follows a hold after steady sliding, whose
-    duration (``start.hold``) is fitted. Starting values come from the records.
+    with steady sliding at the first sample. If a record begins at rest, a hold after steady sliding precedes it, and
+    the duration of the hold (``start.hold``) is fitted. Starting values come from the records.
 
     A machine is fitted to columns of its motions and forces (`experiments.read_motion`), or to frequency responses
-    (`experiments.read_frequency_response`). Its drive and the protocol move it, and the search starts at the values of
-    its parameters. Every column is weighted by its noise.
+    (`experiments.read_frequency_response`). The drive and the protocol move the machine, and the search starts at the
+    values of its parameters. Every column is weighted by its noise.
 
     Parameters
     ----------
     rig : Slider or Machine
-        Laws, and values of the parameters that are not free. Values of free parameters only matter for parameters
-        whose kind no law declares (`steadyslip.core.roles.PARAMETER_KINDS`): their search starts within a decade of
-        them. The drive velocity and (for a constant contact) the normal stress are those of each record.
+        Laws, and values of the parameters that are not free. The value of a free parameter only matters if no law
+        declares its kind (`steadyslip.core.roles.PARAMETER_KINDS`): its search then starts within a decade of the
+        value. The drive velocity and (for a constant contact) the normal stress are those of each record.
     records : Record, or MotionRecord or ResponseData for a machine, or sequence
         Records, which are fitted together.
     free : sequence of str, optional
-        Parameters to fit; by default all of the friction law and the stiffness. The level of friction,
+        Parameters to fit; by default all parameters of the friction law, and the stiffness. The level of friction,
         ``friction.mu_ref``, is always free unless it is fixed. With a protocol, times of its pieces may be free
-        (``protocol.pieces.1.at``). For a machine they must be given: any of its parameters and of the protocol's.
+        (``protocol.pieces.1.at``). For a machine, `free` must name them: any parameters of machine and protocol.
     fixed : sequence of str, optional
         Parameters that keep the value of the rig.
     separate : sequence of str, optional
-        Free parameters with a separate value in every record; all others are shared.
+        Free parameters with a separate value in every record; all other parameters have one value for all records.
     drive : str, optional
         ``commanded``: constant rates with steps and ramps between them, as found in the displacement, or a smooth
-        curve if it does not consist of straight lines; ``smoothed``: a smooth curve in any case; ``measured``: load
-        point and normal stress exactly as measured at the samples, including their noise.
+        curve if the displacement does not consist of straight lines; ``smoothed``: a smooth curve in any case;
+        ``measured``: load point and normal stress exactly as measured at the samples, including their noise.
     protocol : Protocol, Piece or sequence of Piece, optional
         Motion of the load point, on the records' clock, in place of the measured displacement.
     trend : int, optional
@@ -118,18 +118,19 @@ def fit(
     width : float, optional
         Residual beyond which the weight decreases; by default 1.345 robust standard deviations of the residuals.
     weights : array_like, optional
-        Reciprocal of each sample's standard deviation, up to a factor; one array for each record. If neither weights
-        nor a width is given, records with unequal noise are weighted by the noise of their residuals.
+        Reciprocals of the standard deviations of the samples, up to a common factor; one array for each record. If
+        neither weights nor a width is given, records with unequal noise are weighted by the noise of their residuals.
     calibrated : float or str, optional
-        Stiffness of the machine from a calibration, Pa/m, for comparison with the fitted one (``k/k_cal``).
+        Stiffness of the machine from a calibration, Pa/m, for comparison with the fitted stiffness (``k/k_cal``).
     errors : str, optional
         ``auto``: correlation of the residuals is taken into account if it is noticeable; ``correlated``: always;
         ``independent``: never.
     starts : int, optional
         Number of starting points of the search.
     effort : float, optional
-        Limit on the length of the search, as a multiple of what nearly always suffices. It is counted in steps of the
-        model, so that results are the same on every computer; ``fit.search.cut`` is true if the limit was reached.
+        Limit on the length of the search, as a multiple of a length that nearly always suffices. The length is counted
+        in steps of the model, so that results are the same on every computer; ``fit.search.cut`` is true if the limit
+        was reached.
     threads : int, optional
         Number of threads; by default all cores.
     progress : callable, optional
@@ -170,11 +171,11 @@ def search_fit(
     starts: int = STARTS, effort: float = 1.0, threads: int | None = None, progress: Progress | None = None,
     **options: Any,
 ) -> Fit:  # fmt: skip
-    """Fit of a rig to records as by `fit`, without the short refits for its text.
+    """Fit of a rig to records as by `fit`, without the short refits that the text of a fit reports.
 
-    If the displacement around changes is off the commanded loading, two loadings are possible: the load point moved so,
-    or the sensor has glitches there. The fit decides between them by the residuals of friction. The same holds for a
-    displacement with a wave that repeats with travel.
+    If the displacement around changes deviates from the commanded loading, either the load point moved as measured, or
+    the sensor has glitches. Both loadings are fitted, and the one with the smaller residuals of friction is taken. A
+    displacement with a wave that repeats with travel is treated in the same way.
     """
     search: Any = {"errors": errors, "starts": starts, "effort": effort, "threads": threads, "progress": progress}
     plan = make_plan(rig, records, free, errors=errors, starts=starts, effort=effort, **options)
@@ -194,7 +195,7 @@ def search_fit(
                 return search_fit(rig, kept, free, **search, **options)
         if alike:
             plan, found = weighed_by_residuals(alike, plan, found, allowed)
-    else:  # outliers shift the first fit and widen its scatter; the width decreases with their weight
+    else:  # outliers shift the first fit and increase its scatter: as their weight falls, so does the width
         simple = replace(plan, loss="linear")
         found = find_minimum(simple, starts, allowed, progress)
         if alike:
@@ -212,13 +213,13 @@ def search_fit(
     )  # fmt: skip
     wavy = any(WAVE in note for record in plan.records for note in record.notes)
     if wavy and plan.drive == "commanded" and not plan.beginnings and fit.whiteness.p < STRUCTURE:
-        moving = options | {"drive": "smoothed", "initial": "free"}  # a wavy load point never slides steadily
+        moving = options | {"drive": "smoothed", "initial": "free"}  # with a wavy load point, sliding is never steady
         return _without_structure(fit, lambda: search_fit(rig, records, free, **search, **moving))
     return fit
 
 
 def _without_structure(fit: Fit, other: Callable[[], Fit]) -> Fit:
-    """Result of the function `other`, if that fit succeeds and leaves no structure in the residuals; else `fit`."""
+    """Fit that the function `other` returns, if it succeeds and leaves no structure in the residuals; else `fit`."""
     try:
         return found if (found := other()).whiteness.p >= STRUCTURE else fit
     except NotAvailable:
@@ -226,7 +227,7 @@ def _without_structure(fit: Fit, other: Callable[[], Fit]) -> Fit:
 
 
 def _fit_either(rig: Slider, records: Sequence[Record], free: Sequence[str] | None, **options: Any) -> Fit:
-    """Fit with a load point that follows the displacement in pieces or, if that fails, with the better loading."""
+    """Fit with the better of two loadings: the load point as measured around changes, or as commanded."""
     fits, problems = [], []
     for own in ([_followed(record, pieces) for record in records] for pieces in (True, False)):
         try:
@@ -246,12 +247,12 @@ def _fit_either(rig: Slider, records: Sequence[Record], free: Sequence[str] | No
 
 
 def _followed(record: Record, pieces: bool) -> Record:
-    """Record with one of its loadings: in pieces that follow the displacement (if `pieces`), or as commanded."""
+    """Record with one of its loadings: with changes as measured, in many ramps, if `pieces`; else as commanded."""
     return replace(record, commanded=as_followed(record.loading, pieces))
 
 
 def _without_outliers(plan: Plan, found: SearchResult) -> tuple[Record, ...]:
-    """Records without single samples that are far off the fit, which would shift it by many standard errors."""
+    """Records without single samples that are so far off the fit that they shift it by many standard errors."""
     residuals, one = _weighted_residuals(found), found.comparison
     return tuple(
         without_outliers(record, residuals[where]) for record, where in zip(plan.records, one.slices, strict=True)
@@ -265,9 +266,9 @@ def _weighted_residuals(found: SearchResult) -> Array:
 
 
 def refit_from(result: Fit, others: Sequence[Fit]) -> Fit:
-    """Fit of the same model that starts at the values of other fits, if it is better; else `result` itself.
+    """Fit of the model of `result`, started at the values of other fits, if it is better; else `result` itself.
 
-    Parameters that another fit does not have start at their value in `result`.
+    Parameters that another fit lacks start at their value in `result`.
     """
     plan, space = result.plan, result.space
     own = np.array([result.values[name] for name in result.names])

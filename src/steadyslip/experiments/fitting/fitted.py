@@ -24,7 +24,7 @@ from steadyslip.experiments.numerics.noise import Noise, Whiteness, whiteness
 
 @dataclass(frozen=True, eq=False)
 class Fitted(ReadOnly):
-    """Rig fitted to records.
+    """Fit of a rig to records: its definition, the minimum that was found, and errors.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class Fitted(ReadOnly):
         Raises
         ------
         NotAvailable
-            If the search was stopped before, or too few of its starts lead to the minimum.
+            If the search was stopped before it reached a minimum, or too few of its starts lead to the minimum.
         """
         if not self.search.converged:
             raise NotAvailable(
@@ -156,7 +156,7 @@ class Fitted(ReadOnly):
 
     @cached_property
     def jump(self) -> float:
-        """Largest jump of the residuals in standard deviations of their noise, where it is no noise; else 0."""
+        """Largest jump of the residuals in standard deviations of their noise; 0 if no jump is larger than noise."""
         return jump_left(self.comparison, self.scaled_residuals)
 
     @property
@@ -170,7 +170,7 @@ class Fitted(ReadOnly):
 
     @cached_property
     def model(self) -> Array:
-        """Prediction of the fitted model with trends at all samples (n,): friction, or columns of a machine."""
+        """Prediction (n,) of the fitted model, trends included, at all samples: friction, or columns of a machine."""
         return np.asarray(read_only(self.comparison.model(self.coordinates[None])[0][0]))
 
     @property
@@ -185,7 +185,7 @@ class Fitted(ReadOnly):
         return r if self.plan.loss == "linear" else scaled_by_loss(self.plan.loss, r, self.comparison.width)[0]
 
     def part(self, values: Array, record: int = 0) -> Array:
-        """Part of `values` (n,) at all samples that belongs to one record."""
+        """Slice of `values` that belongs to one record; `values` (n,) covers the samples of all records."""
         return values[self.comparison.slices[record]]
 
     @property
@@ -204,12 +204,12 @@ class Fitted(ReadOnly):
 
     @property
     def aic(self) -> float:
-        """Akaike's information criterion, with the noise of this fit; `compare_laws` uses one noise for all laws."""
+        """Akaike's information criterion with this fit's noise model (`compare_laws` uses one noise model for all)."""
         return self.criteria(self.noise)[0]
 
     @property
     def bic(self) -> float:
-        """Schwarz's (Bayesian) information criterion, with the noise of this fit (see `aic`)."""
+        """Schwarz's (Bayesian) information criterion, with this fit's noise model (see `aic`)."""
         return self.criteria(self.noise)[1]
 
     def criteria(self, noise: Sequence[Noise]) -> tuple[float, float]:
@@ -233,22 +233,22 @@ class Fitted(ReadOnly):
         Parameters
         ----------
         covariance : ndarray (p, p)
-            Covariance of the coordinates, finite also for those that are not determined.
+            Covariance of the coordinates, finite also for coordinates that are not determined.
         near : ndarray (m, p)
             Coordinates of other points that fit as well.
         """
         return self
 
     def with_memories(self) -> Self:
-        """Fit without errors of parameters that a memory of normal stress would change much while it fits as well.
+        """Fit in which parameters are undetermined if adding a memory of normal stress changes them but not the misfit.
 
-        This concerns fits of sliders; other fits are returned unchanged.
+        Only fits of sliders are changed; other fits are returned unchanged.
         """
         return self
 
     @cached_property
     def at_bounds(self) -> tuple[str, ...]:
-        """Sentences on parameters that ended at a bound of the search, one for all with the same explanation."""
+        """Sentences on parameters that ended at a bound of the search; parameters with one explanation share one."""
         low, high = self.bounds
         found: dict[tuple[str, str], list[tuple[str, str]]] = {}
         for i, one in enumerate(self.space.unknowns):
@@ -272,9 +272,9 @@ class Fitted(ReadOnly):
         return True
 
     def _between_samples(self, one: Unknown) -> bool:
-        """True for times between two samples, for which an end at a bound has no meaning."""
+        """True for a time between two neighbouring samples, which may end at a bound without a fault of the fit."""
         return False
 
     def _beyond_window(self, one: Unknown, when: str) -> str:
-        """Explanation of an end at a bound; empty for none."""
+        """Explanation, for the user, of an unknown that ended at a bound; empty if there is none."""
         return ""

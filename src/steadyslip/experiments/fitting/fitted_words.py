@@ -15,12 +15,12 @@ from steadyslip.experiments.fitting.residuals import residual_checks
 from steadyslip.experiments.fitting.search import MIN_ARRIVED
 from steadyslip.experiments.numerics.noise import STRUCTURE
 
-WIDTH = 100  # characters of a line of text
-LEAST_CHANCE = 1e-99  # smaller probabilities are printed as "below"
+WIDTH = 100  # largest number of characters in a line of text
+LEAST_CHANCE = 1e-99  # smaller probabilities are printed as "below 1e-99"
 
 
 def quality(fit: Fitted) -> list[str]:
-    """Lines of text on whiteness, errors and the minimum."""
+    """Lines of text on the whiteness of the residuals, on the errors, and on the search for the minimum."""
     search = fit.search
     independent = "residuals taken as correlated" if fit.correlated else "residuals taken as independent"
     reached = f"{search.arrived} of {search.starts} starts lead here"
@@ -84,7 +84,7 @@ def fitted_warnings(fit: Fitted) -> list[str]:
 
 
 def _cut_off(fit: Fitted) -> str:
-    """Warning that the search reached its limit of work, as happens if the model cannot follow the records well."""
+    """Warning that the search reached its limit of work, which happens if the model cannot follow the records well."""
     rough = "" if fit.search.converged else " (not even at a minimum, so that there are no errors)"
     return (
         f"the search ended at its limit of work; this is the best fit found{rough}, and there may be a better one; "

@@ -19,18 +19,19 @@ from steadyslip.model.scales import scale_rows
 from steadyslip.motion.engine import run_many
 from steadyslip.motion.jobs import automatic_method
 
-SENSITIVITY_RTOL = 1e-4  # relative tolerance of derivatives, which steer the search but do not enter its result
+SENSITIVITY_RTOL = 1e-4  # relative tolerance of derivatives, which guide the search but do not affect its result
 SAMPLE_WORK = 0.3  # work of interpolating friction at one sample, in integration steps
-SIZES = (6, 8, 12)  # numbers of directions for which kernels are compiled: few kernels serve all fits
+SIZES = (6, 8, 12)  # numbers of derivatives for which models are compiled: few compiled models serve all fits
 STEPS_PER_DIRECTION = 0.025
-"""Relative increase of the allowed steps per direction: a model must follow the motions of models nested in it."""
-MIN_STEPS = 100  # steps that every motion may take
+"""Relative increase of the allowed steps for each derivative: a model with more parameters must complete the motions of
+models that are nested in it."""
+MIN_STEPS = 100  # number of steps that every motion may take at least
 _STEP = 1e-6  # relative step of central differences (error about 1e-10) for k if it follows from other parameters
 
 
 @dataclass(frozen=True, eq=False)
 class InputTable:
-    """Input table of an experiment in the layout of the kernels.
+    """Input table of an experiment, in the layout that the compiled models read.
 
     Attributes
     ----------
@@ -38,7 +39,7 @@ class InputTable:
         Rows of start (s), end (s), jump of the load point (m), then values and slopes of load-point velocity (m/s),
         disturbance and added normal stress (Pa).
     times : ndarray (samples,)
-        Times at which friction is observed, s, with the zero of the rows.
+        Times at which friction is observed, s, on the same clock as `segments`.
     node_rates : ndarray (jobs or 1, directions or 0, k)
         Derivative of the start of each row by each direction (free parameter).
     input_rates : ndarray (jobs or 1, directions or 0, k, 3)
@@ -51,7 +52,7 @@ class InputTable:
     input_rates: Array = field(default_factory=lambda: np.zeros((1, 0, 0, 3)))
 
     def for_jobs(self, rows: Array | slice) -> InputTable:
-        """Table of selected jobs."""
+        """Table with only the jobs that `rows` selects."""
 
         def own(array: Array) -> Array:
             return array if len(array) == 1 else np.ascontiguousarray(array[rows])
@@ -59,7 +60,7 @@ class InputTable:
         return InputTable(own(self.segments), self.times, own(self.node_rates), own(self.input_rates))
 
     def with_inputs(self, count: int) -> InputTable:
-        """Table for a kernel with `count` inputs; missing ones are zero."""
+        """Table for a compiled model with `count` inputs; inputs that this table lacks are zero."""
         known = (self.segments.shape[2] - 3) // 2
         if known == count:
             return self
@@ -71,7 +72,7 @@ class InputTable:
         return InputTable(np.concatenate([head, values, slopes], axis=2), self.times, self.node_rates, rates)
 
     def for_directions(self, part: slice, size: int) -> InputTable:
-        """Table of selected directions, padded with zeros to the `size` directions of a kernel."""
+        """Table with the directions `part`, padded with zeros to the `size` directions of a compiled model."""
         rates = [
             _padded_directions(array[:, part], size) if array.shape[1] else array
             for array in (self.node_rates, self.input_rates)
@@ -106,7 +107,7 @@ class Forward:
     shifts : int
         Number of free times of the input table.
     unsettled : sequence of str
-        Names, from `ExperimentProgram.unsettled`, of the initial values that are given; their directions come last.
+        Names, from `ExperimentProgram.unsettled`, of initial values that are given; derivatives by them come last.
     begins_free : bool
         True if these initial values are free, so that there are derivatives by them.
     sensitive : bool
@@ -123,7 +124,7 @@ class Forward:
     ) -> None:  # fmt: skip
         self.rig, self.names, self.rtol, self.shifts, self.unsettled = rig, tuple(names), rtol, shifts, tuple(unsettled)
         self.effort = effort or Effort()
-        self.slowest = np.inf  # most steps of a completed motion; inf before the first run
+        self.slowest = np.inf  # largest number of steps in a completed motion; inf before the first run
         self._base = _point_of(rig, self.names)
         self.model = self._base.model
         reduction = experiment_program(self.model, 0, "tsit5").reduction
@@ -134,7 +135,7 @@ class Forward:
         self.program = experiment_program(self.model, self.size, method, not unsettled, observed)
 
     def values(self, parameters: Array) -> OperatingPoint:
-        """Operating points for values of the free parameters, (jobs, names)."""
+        """Operating points for values (jobs, names) of the free parameters."""
         varied = {name: parameters[:, i] for i, name in enumerate(self.names)}
         if self.rig.axial_stiffness is not None:  # k follows from other parameters
             return operating_point(self.rig, varied)
@@ -143,7 +144,7 @@ class Forward:
 
     @cached_property
     def _unit_directions(self) -> Array:
-        """Matrix (directions, parameters and initial values) with 1 where a direction is one of these, else 0."""
+        """Matrix (directions, parameters and initial values): 1 if a direction is this parameter or value, else 0."""
         order = {name: i for i, name in enumerate(self.model.parameters)}
         begins = {name: len(order) + i for i, name in enumerate(self.program.unsettled)}
         found = np.zeros((-(-self.directions // max(self.size, 1)) * self.size, len(order) + len(begins)))
@@ -157,7 +158,7 @@ class Forward:
         return found
 
     def _chain_rule(self, parameters: Array, units: Array) -> Array:
-        """Derivatives (jobs, directions, parameters and initial values) of these by the free ones; 0 if unused."""
+        """Derivatives (jobs, directions, parameters and initial values) of the model's parameters by the directions."""
         chain = np.tile(self._unit_directions, (len(parameters), 1, 1))
         if not self.directions:
             return chain
@@ -212,7 +213,7 @@ class Forward:
         return np.concatenate([found[0], *(more[:, 1:] for more in found[1:])], axis=1)[:, : 1 + self.directions]
 
     def _run(self, table: InputTable, values: OperatingPoint, chain: Array, away: Array) -> Array:
-        """Run the kernel once, with all directions that it has."""
+        """Friction and derivatives (jobs, 1 + directions, samples) from one run of the compiled model."""
         jobs, sigma = len(chain), values.stresses
         constants, start = self.program.arrays(values, chain, away)
         settings = self._settings(table, values, jobs)
@@ -246,7 +247,7 @@ class Forward:
         return predicted
 
     def _settings(self, table: InputTable, values: OperatingPoint, jobs: int) -> Array:
-        """Settings of the kernel for each job, ending with the absolute tolerances of states and sensitivities."""
+        """Settings of the compiled model for each job; the last are absolute tolerances of states and derivatives."""
         scales, unknown = scale_rows(values, self.program.reduction)
         size = scales.shape[1]
         settings = np.zeros((jobs, Setting.ATOL + size * (1 + self.size)))

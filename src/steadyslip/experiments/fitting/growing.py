@@ -1,4 +1,4 @@
-"""Search with a growing part of the record: its beginning is fitted first, then more of it, change by change.
+"""Search with a growing part of the record: its beginning is fitted first, then longer parts, change by change.
 
 One change of the rate determines a, b, d_c and the stiffness nearly independently of the memory of normal stress, and
 over a short time the model is far less nonlinear. A wrong minimum of the whole record, in which the model follows only
@@ -20,14 +20,14 @@ from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
-KEPT = 4  # end points of one stage that start the next: each with two sizes of the memory fills the eight SIMD lanes
-SHARES = (0.05, 0.75)  # range of the memory's share that is tried: the range found in laboratories and half more
+KEPT = 4  # number of end points that start the next stage, each with two sizes of the memory: fills eight SIMD lanes
+SHARES = (0.05, 0.75)  # range of a memory's share α that is tried: the range found in laboratories and half more
 
 
 def grown(
     plan: Plan, begin: Array, low: Array, high: Array, effort: Effort, options: Mapping[str, Any]
 ) -> Minima:  # fmt: skip
-    """End points for the whole records of a plan, of searches from `begin` (m, p) that fit more and more changes.
+    """Minima for the whole records of a plan, from searches that begin at `begin` (m, p) and fit more and more changes.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def grown(
 
 
 def several_changes(plan: Plan) -> bool:
-    """True if a record has a change of normal stress that drives the contact, and other changes."""
+    """True if the normal stress drives the contact and, with other changes of the loading, changes in a record."""
     return plan.follows and plan.pressed and any(
         record.stress_changes and len(loading.changes) > 1
         for record, loading in zip(plan.records, plan.loading, strict=True)
@@ -64,7 +64,7 @@ def stress_alone(plan: Plan) -> bool:
 
 
 def _beginnings(plan: Plan) -> Iterator[Plan]:
-    """Plans of the records up to their second change, their third and so on."""
+    """Plans with the records up to their second change, then up to their third change, and so on."""
     often = max(len(loading.changes) for loading in plan.loading)
     for count in range(1, often):
         parts = zip(plan.records, plan.loading, strict=True)
@@ -73,18 +73,18 @@ def _beginnings(plan: Plan) -> Iterator[Plan]:
 
 
 def _until(record: Record, changes: list[float], count: int) -> Record:
-    """Record up to the earliest begin of the change that follows the first `count` changes."""
+    """Record up to the earliest time of the change that follows the first `count` changes."""
     later = sorted(changes)[count:]
     rows = np.flatnonzero(record.time <= later[0]) if later else np.arange(len(record))
     return record.taken(rows, "its beginning") if len(rows) < len(record) else record
 
 
 def _spread(space: Space, ends: Minima, count: int) -> Array:
-    """Starting points (count, p) from the best ends, each with several sizes of a memory of normal stress."""
+    """Starting points (count, p) from the best end points, with several sizes of a memory of normal stress."""
     kept, _ = ends.distinct(KEPT)
     if not len(kept):
         return kept
-    found = np.resize(kept, (count, len(space)))  # repeats them in turn
+    found = np.resize(kept, (count, len(space)))  # repeats the kept points in turn
     sizes = np.linspace(*SHARES, count - len(kept))
     for i, one in enumerate(space.unknowns):
         if one.kind in ("stress share", "immediate share"):

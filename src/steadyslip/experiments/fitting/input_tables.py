@@ -1,4 +1,4 @@
-"""Input tables of the kernels for loading as measured at the samples, or for a protocol."""
+"""Input tables of the compiled models for loading as measured at the samples, or for a protocol."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import inputs_at
 from steadyslip.protocol.segments import Segments, pack
 
-MIN_RATE_STEP = 0.05  # least change of ln(velocity) that counts as a step; smaller changes are measuring errors
+MIN_RATE_STEP = 0.05  # smallest relative change of velocity that counts as a change; less is a measuring error
 ROWS_PER_PERIOD = 300  # rows per period of a sine wave; straight lines deviate from it by 6e-5 of its amplitude
 MAX_JUMPS = 20  # largest number of jumps whose times are fitted
 _SHIFT = 1e-3  # step (s) of central differences by free times; any step would do, as tables are linear in them
@@ -43,17 +43,17 @@ class Sharp:
     kinks: tuple[tuple[float, float, float], ...] = ()
 
     def rows(self, time: Array) -> Array:
-        """Indices of the samples around all changes, which a thinned record must keep."""
+        """Indices of the samples around all sudden changes; a record with fewer samples must keep these samples."""
         places = [int(np.searchsorted(time, change[0])) for change in (*self.jumps, *self.kinks)]
         around = [np.arange(i - 3, i + 5) for i in places]
         return np.unique(np.clip(np.concatenate([np.empty(0, dtype=int), *around]), 0, len(time) - 1))
 
 
 def sharp_changes(record: Record) -> Sharp:
-    """Sudden changes of a record, which straight lines between samples would smear.
+    """Sudden changes of a record, which straight lines between samples would represent as gradual.
 
-    A change counts if it is much larger than those before and after it. The time of a kink of the displacement follows
-    from the lines on both sides; the time of a jump does not, and is fitted.
+    A change between two samples is sudden if it is much larger than the changes before and after it. The time of a kink
+    of the displacement follows from the lines on both sides; the time of a jump is not known and is fitted.
     """
     jumps: set[int] = set()
     if record.normal is not None:
@@ -71,7 +71,7 @@ def sharp_changes(record: Record) -> Sharp:
 
 
 def _jumps(time: Array, values: Array, least: float) -> Array:
-    """Indices of samples before isolated jumps larger than a share `least` of the largest value."""
+    """Indices of the samples before isolated jumps that are larger than a share `least` of the largest value."""
     size, spacing = np.abs(np.diff(values)), np.diff(time)
     if len(size) < 5:
         return np.empty(0, dtype=int)
@@ -83,7 +83,7 @@ def _jumps(time: Array, values: Array, least: float) -> Array:
 
 
 def _kinks(time: Array, displacement: Array) -> list[tuple[int, float]]:
-    """Index of the interval and time, s, of each kink: where the straight lines on both sides meet."""
+    """Kinks of the displacement: index of the sample before, and time (s) at which the lines on both sides meet."""
     slopes = np.diff(displacement) / np.diff(time)
     if len(slopes) < 7:
         return []
@@ -99,7 +99,7 @@ def _kinks(time: Array, displacement: Array) -> list[tuple[int, float]]:
 
 
 def _curve_through(time: Array, values: Array, jumping: set[float]) -> Any:
-    """Piecewise cubic curve through samples, with zero slope next to jumps; `jumping` has their first times."""
+    """Piecewise cubic curve through samples, with zero slope next to jumps; `jumping` has the times before jumps."""
     from scipy.interpolate import CubicHermiteSpline
 
     slopes = np.gradient(values, time)
@@ -110,9 +110,10 @@ def _curve_through(time: Array, values: Array, jumping: set[float]) -> Any:
 
 
 def _curve_cuts(time: Array, values: Array, jumping: set[float]) -> tuple[Array, Array]:
-    """Intervals on which a straight line deviates from a smooth curve, and times, s, that divide them finely enough.
+    """Intervals in which a smooth curve is clearly not straight, and times (s) that divide them finely enough.
 
-    Deviations count only above the noise, which is estimated by predicting samples from their neighbours.
+    Only deviations from a line that exceed the noise count. The noise is that of samples about predictions from their
+    neighbours.
     """
     if len(time) < 8:
         return np.empty(0, dtype=int), np.empty(0)
@@ -194,7 +195,7 @@ class MeasuredInputs:
     def _set_divided_rows(
         self, rows: Array, row: int, record: Record, i: int, jumps: bool, pressed: Array | None
     ) -> None:
-        """Set the two rows of a divided interval: constant values before and after a jump, two velocities at a kink."""
+        """Set the two rows of a divided interval: values before and after a jump, or two velocities at a kink."""
         if not jumps:
             early, late = rows[row - 1, 1] - rows[row - 1, 0], rows[row, 1] - rows[row, 0]
             if record.displacement is None:
@@ -218,7 +219,7 @@ class MeasuredInputs:
         times : ndarray (jobs, jumps)
             Times of the jumps, s, on the record's clock.
         first : int
-            Index of the direction of the first jump.
+            Index, among all directions, of the derivative by the time of the first jump.
         directions : int
             Number of directions of derivatives; 0 for a table without derivatives.
         """
@@ -253,7 +254,7 @@ class ProtocolInputs:
     Attributes
     ----------
     plain : dict of str to float
-        Parameters of the protocol as given, by dotted name.
+        Parameters of the given protocol, by dotted name.
     """
 
     def __init__(
@@ -324,12 +325,12 @@ def _rows_of(array: Array, own: Array, jobs: int) -> Array:
 
 
 def _inputs_at(segments: Segments, own: Array, times: Array, jobs: int) -> Array:
-    """Inputs of the segments `own` (jobs, rows) at given times, (jobs, rows, 3)."""
+    """Inputs (jobs, rows, 3) of the segments with the indices `own` (jobs, rows) at given times."""
     return inputs_at(segments, np.arange(jobs)[:, None], own, times)
 
 
 def _wave_nodes(segments: Segments, first: float, last: float) -> Array:
-    """Times of further rows, s, so that sine waves are nearly straight on each; empty without waves."""
+    """Times (s) of further rows, on each of which a sine wave is nearly straight; empty without waves."""
     fastest = float(segments.angular_frequency.max(initial=0.0, where=segments.amplitude != 0))
     if not fastest:
         return np.empty(0)

@@ -1,4 +1,4 @@
-"""Text on how friction depends on the load in a table with several loads, and on how to write that in a rig file."""
+"""Text on how friction depends on the load in a table with several loads, and how a rig file describes this."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from steadyslip.core.format import enumerated, format_quantity
 from steadyslip.experiments.fitting.speed_fit import SAME, DirectionFit, SpeedFindings
 from steadyslip.experiments.fitting.steady_curve import DAMPING, OFFSET
 
-LISTED = 4  # most loads that are listed one by one
-HARDLY = 10.0  # friction hardly follows the load if the internal preload is this multiple of the largest load
-NONE = 1e-6  # an internal preload, or drag, below this share of the load, or of friction, is reported as zero
+LISTED = 4  # largest number of loads that are listed one by one
+HARDLY = 10.0  # friction hardly depends on the load if the internal preload exceeds this multiple of the largest load
+NONE = 1e-6  # an internal preload below this share of the load, or a drag below this share of friction, counts as zero
 
 
 def loads_of(found: SpeedFindings, one: DirectionFit) -> list[float]:
-    """Distinct loads of the rows of one direction in rising order, N (N m for torques)."""
+    """Distinct loads, in rising order, of the rows of one direction, N (N m for torques)."""
     table = found.table
     if table.load is None or table.is_coefficient:
         return []
@@ -23,7 +23,7 @@ def loads_of(found: SpeedFindings, one: DirectionFit) -> list[float]:
 
 
 def internal_preload(one: DirectionFit) -> float:
-    """Internal preload (N or N m), which presses in addition to the load of the table; 0 if there is none."""
+    """Internal preload (N or N m), a constant load in addition to the load of the table; 0 if there is none."""
     return 0.0 if abs(one.further(OFFSET)) < NONE * one.load else one.further(OFFSET)
 
 
@@ -46,7 +46,7 @@ def loads_text(found: SpeedFindings, one: DirectionFit) -> str:
 
 
 def dependence(found: SpeedFindings, one: DirectionFit) -> str | None:
-    """Line of text on how friction follows the load in one direction; None with fewer than two loads."""
+    """Line of text on how friction depends on the load in one direction; None with fewer than two loads."""
     loads = loads_of(found, one)
     if len(loads) < 2:
         return None
@@ -63,9 +63,9 @@ def dependence(found: SpeedFindings, one: DirectionFit) -> str | None:
 
 
 def load_comments(found: SpeedFindings, lever: float) -> list[str]:
-    """Comments of the rig file below its constant load: how to write another load, and a load that a link carries.
+    """Comments of the rig file below its constant load: how to write another load, or a load that a link carries.
 
-    `lever` is the load of the rig (N) over that of the table.
+    `lever` is the load of the rig (N) over the load of the table.
     """
     one, loads = found.main, loads_of(found, found.main)
     if len(loads) < 2:
@@ -91,7 +91,7 @@ def load_comments(found: SpeedFindings, lever: float) -> list[str]:
 
 
 def summary(found: SpeedFindings, load: float) -> str | None:
-    """Sentence on the load of the rig file (N) and the others of the table; None with fewer than two loads."""
+    """Sentence on the load of the rig file (N) and the other loads of the table; None with fewer than two loads."""
     loads = loads_of(found, found.main)
     if len(loads) < 2 or internal_preload(found.main) > HARDLY * loads[-1]:
         return None

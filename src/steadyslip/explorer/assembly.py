@@ -152,8 +152,8 @@ def page_parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -
         machine, moving = motion_part(rig, branch)
         driven = driver()
         if moving["parameters"] == facts["parameters"]:
-            del moving["parameters"]  # `facts` has them already
-    except NotAvailable as refused:  # the page shows the verdict without motion
+            del moving["parameters"]  # `facts` has the parameters already
+    except NotAvailable as refused:  # then the page shows the verdict without motion
         still = str(refused)
     script = _joined(MODULES, ENTRIES, text)
     engine = _minified(driven, DRIVER)
@@ -173,7 +173,7 @@ def page_parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -
 
 
 def _joined(names: Iterable[str], known: Iterable[str], *generated: str) -> str:
-    """Minified modules of `web/` in one scope, with the runtime functions that they and generated code need."""
+    """Minified modules of `web/` in one scope, with the runtime functions that modules and generated code need."""
     modules = [_read_web(f"{name}.js") for name in names]
     needed = javascript.runtime(*generated, *modules)
     return _shortened(javascript.as_script(needed, *modules), frozenset({*known, *javascript.runtime_names()}))
@@ -209,7 +209,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "area": display_area("Pa", rig.area),
         "stiffnessArea": display_area("Pa/m", rig.area),
         "parameters": [_parameter(rig, name, branch) | file.source_fields(name) for name in names],
-        "facts": {key: value for key, value in facts.items() if key != "parameters"},  # the page has them from `places`
+        "facts": {key: value for key, value in facts.items() if key != "parameters"},  # the page has these in `places`
         "places": places,
         "fixed": [float(np.asarray(value)) for value in point.arguments],
         "axial": names.index(axial) if axial in names else -1,
@@ -242,7 +242,7 @@ _RESULT_UNITS = frozenset({"m", "m/s", "s", "Hz", "1/s", "rad/s", "Pa", "N", "N 
 def _written_units(rig: Slider | Machine) -> dict[str, list[tuple[str, float]]]:
     """Units of the rig's file that differ from SI units, as (name, size in SI units), by SI unit of a page's numbers.
 
-    Units of friction per load are left out: they are used for single parameters only.
+    Units of friction per load are left out, because they are used for single parameters only.
     """
     used = {outside(one.role.unit, rig.area_of(name))[1] for name, one in rig.parameters().items()}
     units = {si: units_for(si, display_names()) for si in sorted(used | _RESULT_UNITS) if si != "1"}
@@ -259,7 +259,7 @@ def _slider_data(rig: Slider, facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _stiffness(rig: Slider, names: list[str]) -> str | None:
-    """Name of the stiffness of which a slider's page shows the stable values; None without a stiffness."""
+    """Name of the stiffness whose stable values a slider's page shows; None for a rig without a stiffness."""
     stiffness = "slider.axial_stiffness" if "slider.axial_stiffness" in names else rig.stiffness_name()
     return stiffness if stiffness in names else None
 
@@ -277,7 +277,7 @@ def _machine_data(rig: Machine, facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _checked_parameter(rig: Machine, names: list[str]) -> str | None:
-    """Name of the first stiffness or gain that enters linearly; the page compares its stable values with Python's."""
+    """Name of the parameter whose stable values the page compares with Python's: the first linear stiffness or gain."""
     point = operating_point(rig)
     stiff = (name for name in rig.of_kind("stiffness") if name in names)
     return next((name for name in stiff if linear_set(point, name) is not None), None) if point.exists else None
@@ -322,7 +322,7 @@ def _rounded(value: float, digits: int) -> float:
 
 
 def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[str, Any]]:
-    """Results of Python at the values of the rig and at some others, with which the page compares its own."""
+    """Results of Python, with which the page compares its own, at the values of the rig and at some other values."""
     stiff = ways_of(rig).compared(rig, names)
     changes: list[dict[str, float]] = [{}]
     for name, factor in ((stiff, 0.1), (stiff, 10.0), ("drive.velocity", 3.0)):

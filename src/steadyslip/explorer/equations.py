@@ -41,7 +41,7 @@ def page_model(rig: Slider | Machine) -> Model:
 
 
 def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
-    """JavaScript expression with the programs of linear stability, and data about them.
+    """JavaScript expression with the programs of linear stability, and data about these programs.
 
     Returns
     -------
@@ -149,7 +149,10 @@ def _static_terms(model: Model) -> list[sp.Expr]:
 
 
 def _coefficient_program(model: Model, coefficients: Sequence[sp.Expr]) -> Program:
-    """Program of the coefficients and their `_verdict_values`; the highest is NaN if lost by cancellation."""
+    """Program of the coefficients and their `_verdict_values`.
+
+    The highest coefficient is NaN if cancellation leaves only rounding.
+    """
     levels = highest_coefficients(model)
 
     def judged(values: list[Node]) -> list[Value]:
@@ -159,7 +162,7 @@ def _coefficient_program(model: Model, coefficients: Sequence[sp.Expr]) -> Progr
             c[-1] = select(lost > 0, float("nan"), c[-1])
         spare: Value = 0.0
         for terms in vanishing:
-            gone: Value = 0.0  # the sizes of inertia, and of inertia and damping together
+            gone: Value = 0.0  # size of inertia, or of inertia and damping together
             for _ in terms:
                 gone = gone + abs(next(rest))
                 spare = spare + select(gone <= 0, 1.0, 0.0)
@@ -211,7 +214,7 @@ def _interval(ingredients: list[Node]) -> Sequence[Value]:
 
 
 def _linear_split_program() -> Program:
-    """Program: p and q of a coefficient p + k q from its values at three values of k, and 1 if it is linear, else 0."""
+    """Program that finds p and q of a coefficient p + k q from its values at three k; and 1 if it is linear, else 0."""
     made = Program("linear")
     low, own, high = ([made.load(place)] for place in range(3))
     p, q, straight = crossing.linear_split(low, own, high, select)

@@ -14,7 +14,7 @@ from steadyslip.machine.drawing import DRIVEN, FORCED, INK, PALE, Drawing, Penci
 from steadyslip.machine.machine import Machine
 
 UNIT = 62.0  # SVG units per unit of the drawing: texts of size 11 fit (by trial)
-FONT_SIZES = {False: 11, True: 13}  # by `large`, SVG units
+FONT_SIZES = {False: 11, True: 13}  # SVG units; key: True for large text
 _CLASSES = {PALE: "pale", DRIVEN: "load", FORCED: "forced"}
 _THIN = 'vector-effect="non-scaling-stroke"'
 
@@ -22,7 +22,7 @@ _THIN = 'vector-effect="non-scaling-stroke"'
 def machine_sketch(machine: Machine) -> str:
     """Self-contained ``<svg>`` element with the sketch of a machine."""
     pencil = SvgPencil()
-    Drawing(machine, pencil, values=False).draw()  # values change on the page
+    Drawing(machine, pencil, values=False).draw()  # without values, as these change on the page
     return pencil.svg()
 
 

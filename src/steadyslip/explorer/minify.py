@@ -16,14 +16,14 @@ _PRODUCT = re.compile(r"(?<=[-+(,=?:<>&|])\(([\w.\[\]]+(?:[*/][\w.\[\]]+)+)\)(?=
 _SUM = re.compile(r"(?<=[\[(,=?:])\(([\w.\[\]]+(?:[-+*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|\]])")
 # + (-a) b equals - a b exactly
 _NEGATIVE = re.compile(r"(?:\+|(?<=[=(,?:]))\(-([\w.\[\]]+)\)(?=[-+*/),;])")
-_LINE_END = re.compile(r"([;{,\n])\n+")  # line ends that do not end a statement
+_LINE_END = re.compile(r"([;{,\n])\n+")  # line ends that can be removed, as they do not end a statement
 _SPACED_SIGNS = re.compile(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *")
 
 
 def minify(text: str) -> str:
     """Minified text of a JavaScript module without multi-line strings."""
     bare = re.sub(r"^ *(//.*|/\*\*(?:(?!\*/)[\s\S])*\*/) *\n", "", text, flags=re.M)
-    bare = re.sub(r"/\*\* @\w[^\n]*?\*/ ?", "", bare)  # JSDoc types within a line
+    bare = re.sub(r"/\*\* @\w[^\n]*?\*/ ?", "", bare)  # JSDoc comments with types within a line
     bare = re.sub(r"(?<=[;{},)]) // [^\n]*$|^ +", "", bare, flags=re.M)
     return _LINE_END.sub(
         r"\1", "".join(_SPACED_SIGNS.sub(_strip_spaces, part) if code else part for part, code in split_code(bare))

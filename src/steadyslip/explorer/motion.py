@@ -46,14 +46,14 @@ from steadyslip.motion.status import NEEDS_MASS, THROUGH_DASHPOT
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, Hold, NormalStressStep, Protocol, VelocityStep
 from steadyslip.protocol.segments import pack
 
-OPTIONS = Options(rtol=1e-6, most_steps=100_000)  # errors below a pixel; steps for some seconds in a browser
+OPTIONS = Options(rtol=1e-6, most_steps=100_000)  # errors below a pixel, steps for some seconds of computing
 DISTURBANCES: dict[str, Callable[[float, float, float], Any] | None] = {
     "velocity": lambda at, size, drive: VelocityStep(at=at, to=drive * size),
     "hold": lambda at, size, drive: Hold(at=at, duration=size),
     "push": lambda at, size, drive: DisplacementStep(at=at, by=size),
     "normal": lambda at, size, drive: NormalStressStep(at=at, by=size),
     "pull": lambda at, size, drive: DisturbanceStep(at=at, by=size),
-    "blow": None,  # changes the starting velocity, not the protocol
+    "blow": None,  # a blow changes the starting velocity, not the protocol
 }
 """Disturbances on a page: function that returns a protocol piece from time (s), size (SI) and drive velocity (m/s)."""
 # time, size, end and drive velocity; their sums and products all differ, so that each can be identified in segments

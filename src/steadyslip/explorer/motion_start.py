@@ -72,7 +72,7 @@ class Shares:
 
 
 def _blow_factor(coordinate: Coordinate) -> sp.Symbol:
-    """Symbol for the starting velocity over that of steady sliding."""
+    """Symbol for the ratio of a coordinate's starting velocity to its velocity in steady sliding."""
     return inner_symbol(f"blow_on_{coordinate.velocity.name}", positive=True)
 
 
@@ -124,7 +124,7 @@ def scales_program(reduction: Reduction, eliminate: int | tuple[int | None, ...]
     wanted += [contact.sigma_ss for contact in model.contacts]
     wanted += [contact.area for contact in model.contacts]
     several = [weight_expressions(model, index) for index in range(len(model.contacts))]
-    wanted += [sp.sympify(e).xreplace({sp.zoo: sp.nan}) for own in several for e in own]  # division by zero: NaN
+    wanted += [sp.sympify(e).xreplace({sp.zoo: sp.nan}) for own in several for e in own]  # a division by zero gives NaN
     if model.contacts[0].name:
         wanted += scale_expressions(model)
     if not model.is_single:

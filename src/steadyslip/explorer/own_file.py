@@ -44,7 +44,7 @@ class OwnFile:
             return {}
         one = self.rig.parameters()[name]
         factor, unit = display_unit(self.rig, one.role.unit)
-        kept = self.rig.area is None and own.total  # areas may vary: shown as stresses
+        kept = self.rig.area is None and own.total  # the area may vary, so values are shown as stresses
         found: dict[str, Any] = {"own": ["" if kept else own.unit, 1.0 if kept else own.size, own.text]}
         if factor != 1.0 and not own.total:
             found |= {"factor": 1.0, "unit": one.role.unit}

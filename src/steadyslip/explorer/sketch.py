@@ -15,7 +15,7 @@ from steadyslip.machine.slider import Slider
 
 WIDTH, HEIGHT = 340, 174  # size of the whole sketch
 GROUND_Y = 132.0  # y of the surface
-PERIOD = 10.0  # period of the hatching of the ground
+PERIOD = 10.0  # distance between lines of the ground's hatching
 BLOCK_LENGTH, TOP_Y = 80.0, 86.0  # length of the block, height of its top
 SPRING_Y = 108.0  # y at which the spring is attached to the block
 SPRING_LENGTH = 130.0  # length of the spring
@@ -150,7 +150,7 @@ def _links(rig: Slider) -> str:
     middle, lines = ((x1 + x2) / 2, (y1 + y2) / 2), ""
     if rig.stiffness or rig.axial_stiffness:
         lines += _link(_zigzag(), (x1, y1 - apart), (x2, y2 - apart)) + _text(middle[0], middle[1] - apart - 10, "k")
-    else:  # only a controller
+    else:  # there is no spring, only a controller
         lines += _path((x1, y1), (x2, y2), style='stroke-dasharray="2 5"')
     if rig.damping:
         lines += _link(_dashpot(), (x1, y1 + apart), (x2, y2 + apart)) + _text(middle[0], middle[1] + apart + 21, "c")

@@ -131,7 +131,7 @@ def _product(one: Value | None, other: Value | None) -> Value | None:
 
 
 def _determinant(rows: Rows) -> Value | None:
-    """Determinant by expansion along the first row; None is zero."""
+    """Determinant of a matrix of nodes, by expansion along the first row; None stands for zero."""
     if not rows:
         return 1.0
     total: Value | None = None

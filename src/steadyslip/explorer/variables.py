@@ -35,7 +35,7 @@ _BEFORE_NAME = frozenset({"get", "set", "async", "static"})
 
 
 class _Word(NamedTuple):
-    """A name in code: its text, True if a variable, and True if key and variable at once, as in ``{ name }``."""
+    """A name in code: its text, True if it is a variable, and True if it is both key and variable (``{ name }``)."""
 
     text: str
     is_variable: bool
@@ -82,7 +82,7 @@ def _words(text: str) -> Iterator[_Word | str]:
         if not token.strip():
             continue
         in_class = in_class or (token == "class" and before != "." and after != ":")
-        if token[0] in ")]}":  # also the text of a template behind a hole
+        if token[0] in ")]}":  # this may also be the text of a template after ``${...}``
             opened.pop()
         if token == "{":
             opened.append("class" if in_class else "block" if before in _BEFORE_BLOCK else "object")

@@ -33,7 +33,7 @@ from steadyslip.maps.view.map_result import MapResult
 from steadyslip.maps.work.run import run_map
 
 MOST_ROUNDS = 12  # largest number of halvings: 4096 steps between two points of the map; chosen by trial
-MOST_AXES = 3  # the number of cells along an edge grows as size^(axes - 1)
+MOST_AXES = 3  # largest number of axes: the number of cells along an edge grows as size^(axes - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +202,10 @@ def _level(found: MapResult, of: str, level: float | None) -> float | None:
 
 
 class _Sides:
-    """Function that returns the side of the edge for values of a result: the kind, or 1 above the level, else 0."""
+    """Function that returns the side of the edge on which values of a result lie.
+
+    The side is the kind of the result or, for numbers, 1 above the level and 0 below.
+    """
 
     def __init__(self, found: MapResult, of: str, level: float | None) -> None:
         self.level = None if found.words(of) else level
@@ -268,7 +271,7 @@ class _Lattice:
 
     def spacing(self, axis: int) -> float:
         nodes = np.zeros((self.shape[axis], len(self.names)))
-        if self.shape[axis] > 2**20:  # too many nodes for memory: take the spacing as uniform between map points
+        if self.shape[axis] > 2**20:  # too many nodes for memory: between map points the spacing is taken as uniform
             return float(np.max(np.abs(np.diff(self.values[axis]))) / self.size)
         nodes[:, axis] = np.arange(self.shape[axis])
         return float(np.max(np.abs(np.diff(self.parameters(nodes)[self.names[axis]]))))
@@ -351,9 +354,9 @@ def _is_mixed(lattice: _Lattice, known: _KnownNodes, cells: Array, step: int) ->
 
 
 def _divided(lattice: _Lattice, known: _KnownNodes, cells: Array, step: int, compute: Any) -> Array:
-    """Lowest corners of cells of size `step` with mixed corners, by halving cells of size 2 `step` at the edge.
+    """Lowest corners of the cells of size `step` that the edge crosses, from halving cells of size 2 `step`.
 
-    Neighbouring cells that the edge turns out to cross are halved as well.
+    Neighbouring cells that turn out to be crossed by the edge are halved as well.
     """
     active = np.unique(lattice.flat(cells))
     waiting = active
@@ -364,7 +367,7 @@ def _divided(lattice: _Lattice, known: _KnownNodes, cells: Array, step: int, com
         new = flat[~known.has(flat)]
         if len(new):
             known.add(new, compute(new))
-        # nodes on a face that differ from a corner: the edge continues in the neighbouring cell
+        # if a node on a face differs from a corner, the edge continues in the neighbouring cell
         kinds = known.of(lattice.flat(nodes.reshape(-1, nodes.shape[-1]))).reshape(len(waiting), -1)
         is_corner = np.all(lattice.inside != 1, axis=1)
         odd = np.any(kinds[:, :, None] != kinds[:, None, is_corner], axis=2) & ~is_corner

@@ -21,9 +21,9 @@ from steadyslip.maps.plan.map import Map, evaluate
 
 POINTS = 4096  # default number of sets of points; chosen by trial, accuracy against time
 RESAMPLES = 200  # number of bootstrap samples; chosen by trial, accuracy against time
-BLOCK = 32  # sets of points evaluated together, between checks for Ctrl-C; chosen by trial
-LEAST, MOST = 64, 2**20  # allowed sets of points; chosen by trial: fewer give intervals as wide as an index's range
-ROUNDING = 1e-10  # a result with a smaller relative range counts as constant: a million rounding errors
+BLOCK = 32  # number of sets of points that are evaluated between checks for Ctrl-C; chosen by trial
+LEAST, MOST = 64, 2**20  # allowed numbers of sets of points; by trial: fewer give intervals as wide as an index's range
+ROUNDING = 1e-10  # a result is constant if its relative range is smaller: a million rounding errors
 WIDE = 0.2  # the summary warns if the interval of an index (0 to 1) is wider
 LEVEL = 0.95  # confidence level of the intervals
 

@@ -21,8 +21,8 @@ SAMPLERS = ("sobol", "latin-hypercube")
 SAMPLE = "sample"
 COMPLETE = "complete"  # name of the array of chunk checksums in a stored map
 MOST_POINTS = 10**12  # largest number of points of a map: results of 8 bytes then have 8 TB
-SOBOL_BITS = 32  # largest resolution at which SciPy's fast_forward works
-LARGEST_HYPERCUBE = 2**22  # points; all are generated even if one is needed, 34 MB per parameter
+SOBOL_BITS = 32  # bits of the Sobol sequence: the most with which SciPy's fast_forward works
+LARGEST_HYPERCUBE = 2**22  # largest number of points: all are generated even if one is needed, 34 MB per parameter
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class _Sobol:
             self._restart()
         if start > self.position:
             self.engine.fast_forward(start - self.position)
-        with warnings.catch_warnings():  # SciPy warns if the length is no power of 2, which is needless for a part
+        with warnings.catch_warnings():  # SciPy warns of lengths that are no power of 2; parts may have any
             warnings.simplefilter("ignore", UserWarning)
             found = self.engine.random(stop - start)
         self.position = stop

@@ -24,7 +24,7 @@ from steadyslip.protocol import Protocol
 
 
 def _of_sliders(rig: Slider | Machine) -> Iterator[Problem]:
-    """Yield a Problem if the rig is a machine, for measures of the one stiffness of a slider."""
+    """Yield a Problem if the rig is a machine, which has no single stiffness as measures of sliders need."""
     if rig.default_along is None:
         yield Problem(
             "", "is only for sliders, which have one stiffness; for machines compute 'edge' or 'stable_values' with "

@@ -20,7 +20,7 @@ from steadyslip.nonlinear.hunting.plant import plant_of
 from steadyslip.protocol import Protocol
 
 SETTLES, HUNTS, RUNS_AWAY, UNDECIDED = range(4)
-SECONDS_OF_HUNTING = 0.5  # CPU time of one simulation (s); measured: 0.1 to 4 s; only sets the size of chunks
+SECONDS_OF_HUNTING = 0.5  # s, CPU time assumed for one simulation (measured: 0.1 to 4 s); only sets the size of chunks
 
 
 class Hunting(Measure, name="hunt"):
@@ -55,7 +55,7 @@ class Hunting(Measure, name="hunt"):
         own = rig.with_values({name: value for name, value in values.items() if name not in moved})
         try:
             return _numbers(hunt(own, replaced(protocol, moved, "protocol."), until=self.until, rtol=self.rtol))
-        except NotAvailable:  # found only during simulation: too many switches at once, or steps too short
+        except NotAvailable:  # raised only during simulation: too many switches at once, or steps too short
             return (UNDECIDED, np.nan, np.nan, np.nan, np.nan)
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:

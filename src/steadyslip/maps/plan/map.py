@@ -40,12 +40,12 @@ from steadyslip.maps.plan.measures import PROBES, FunctionMeasure, Measure, Outp
 from steadyslip.model.point import operating_point
 from steadyslip.protocol import Protocol
 
-SECONDS = 0.5  # CPU time of a chunk (s): long compared with distributing it, short enough to be lost
-LARGEST_CHUNK = 2**20  # points; bounds a worker's memory (8 MiB per result)
-LEAST_CHUNKS = 32  # so that all workers are busy until the end; chosen by trial
+SECONDS = 0.5  # s, CPU time of a chunk: long compared with its distribution, yet short enough to be lost
+LARGEST_CHUNK = 2**20  # largest number of points of a chunk; bounds a worker's memory (8 MiB per result)
+LEAST_CHUNKS = 32  # least number of chunks, so that all workers are busy until the end; chosen by trial
 SHORT = 0.2  # s of CPU time; LEAST_CHUNKS does not make chunks shorter than this; chosen by trial
-MOST_AXIS = 10**7  # values along one axis, which is kept in memory (80 MB)
-MOST_CHUNKS = 2 * 10**6  # each has a few files; chosen by trial so that file systems cope
+MOST_AXIS = 10**7  # largest number of values along one axis, which is kept in memory (80 MB)
+MOST_CHUNKS = 2 * 10**6  # largest number of chunks, each a few files; chosen by trial so that file systems cope
 
 AnyMeasure = Measure | FunctionMeasure
 
@@ -145,7 +145,7 @@ class Map(Displayed):
             problems += error.problems
 
     def _extremes(self, name: str) -> list[dict[str, Any]]:
-        """Two dicts {`name`: value}, of the smallest and the largest value of a sampled parameter."""
+        """Two dicts {`name`: value}, with the smallest and with the largest value of a sampled parameter."""
         if isinstance(self.sampling, Generated):
             return [{n: end} for n, low, high, _ in self.sampling.ranges for end in (low, high) if n == name]
         if self.sampling is None:
@@ -177,7 +177,7 @@ class Map(Displayed):
             problems += (p.under("map.over") for p in self._allowed_together())
 
     def _allowed_together(self) -> tuple[Problem, ...]:
-        """Problems of the rigs at the corners of the map, where all axes are at an end."""
+        """Problems of the rigs at the corners of the map, where every varied parameter is at an end of its range."""
         known = self.rig.parameters()
         axes = [a for a in self.axes if a.name in known and not known[a.name].role.adds_state]
         corners = np.meshgrid(*(a.values[[0, -1]] for a in axes), indexing="ij", sparse=True)
@@ -188,7 +188,7 @@ class Map(Displayed):
         return ()
 
     def _build(self, vary: Mapping[str, np.ndarray], scan: bool = False) -> None:
-        """Build the rigs with these values, to raise the errors that they have."""
+        """Build the rigs with the values in `vary`, so that errors in these values are raised."""
         if not self.rig.holds:
             operating_point(self.rig, vary, scan=scan)
             return
@@ -244,7 +244,7 @@ class Map(Displayed):
             return (Problem(name, "varies, but no measure simulates the protocol; add 'events' to compute"),)
         role = self.known()[name].role
         if any(one.moves for one in self.compute) and role.adds_state:
-            return ()  # cases with and without the state are simulated as separate groups
+            return ()  # points with and without the state are simulated as separate groups
         try:
             self._build({name: np.asarray(values, dtype=float)}, scan=True)
         except ParameterError as error:
@@ -281,7 +281,7 @@ class Map(Displayed):
 
     @cached_property
     def chunks(self) -> tuple[int, ...]:
-        """Points of a chunk along each dimension: all along the last ones, a part along the one before, then 1."""
+        """Points of a chunk along each dimension: all along the last dimensions, some along the one before, else 1."""
         target = self.chunk or self._suited_chunk()
         found: list[int] = []
         for size in reversed(self.shape):
@@ -301,7 +301,7 @@ class Map(Displayed):
         """Number of points per chunk that takes about `SECONDS`, within the limits of chunk size and number."""
         seconds = self.seconds
         points = min(SECONDS / seconds, LARGEST_CHUNK)
-        least = -(-2 * self.size // MOST_CHUNKS)  # twice as many chunks as needed: the last of a row may be small
+        least = -(-2 * self.size // MOST_CHUNKS)  # the factor 2 is needed because the last chunk of a row may be small
         return max(1, int(max(min(points, self.size / LEAST_CHUNKS), min(points, SHORT / seconds))), least)
 
     def probes(self) -> dict[str, Any]:
@@ -340,7 +340,10 @@ def default_measures(rig: Rig) -> tuple[str, ...]:
 
 
 def _unfit(one: AnyMeasure, rig: Rig) -> list[Problem]:
-    """List with a Problem if a measure of steady sliding is computed for a rig that holds a place, or the reverse."""
+    """List with a Problem if the measure does not suit the rig.
+
+    Measures of steady sliding do not suit a rig that holds a place, and hunting does not suit a rig that slides.
+    """
     if one.held is None or one.held == rig.holds:
         return []
     if one.held:
@@ -361,7 +364,7 @@ def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, 
 
 
 def _relevant(one: AnyMeasure, vary: Mapping[str, Any]) -> dict[str, Any]:
-    """Varied parameters that affect a measure: those of the protocol only if the measure simulates."""
+    """Varied parameters that affect a measure; parameters of the protocol only if the measure simulates."""
     return {name: a for name, a in vary.items() if one.moves or not name.startswith("protocol.")}
 
 

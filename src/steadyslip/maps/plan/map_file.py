@@ -20,7 +20,7 @@ from steadyslip.maps.plan.map import Map, protocol_parameters
 from steadyslip.maps.plan.measures import Measure
 from steadyslip.protocol import Protocol
 
-MOST_GIVEN = 2**24  # largest chunk that a file may ask for, points: results of 8 bytes then have 128 MiB
+MOST_GIVEN = 2**24  # largest number of points of a chunk that a file may ask for: results of 8 bytes then have 128 MiB
 FIT_POINTS = 1000  # default number of draws from a fit: quantiles at 2.5 % have an error of 0.5 %
 LARGEST_SEED = 2**63 - 1  # largest integer of TOML
 
@@ -209,7 +209,7 @@ class _MapReader:
         return [one for one in every if one not in faulty] or (["status"] if every else [])
 
     def _whole(self, place: str, over: Mapping[str, Any]) -> list[tuple[str, Any]]:
-        """Name and value of parameters, without ranges that lack an end; the names of those are checked as well."""
+        """Names and values of parameters; ranges that lack an end are left out after a check of their names."""
         found = []
         for name, one in over.items():
             if isinstance(one, RangeSettings) and None in (one.start, one.stop):
@@ -229,7 +229,7 @@ class _MapReader:
             try:
                 full = resolve(name, self.known)
             except UnknownNameError:
-                continue  # reported by Map
+                continue  # `Map` reports it
             role, area = self.known[full].role, self.rig.area_of(full)
             if area is None:
                 continue

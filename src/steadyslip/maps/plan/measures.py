@@ -36,9 +36,9 @@ from steadyslip.nonlinear.kicks.kicks import KICKS, OF_MACHINES, kicks_of
 from steadyslip.nonlinear.kicks.places import place_problems
 from steadyslip.protocol import Protocol
 
-SECONDS_A_STEP = 4e-8  # CPU time (s) of a step in a lane, measured; only sets the size of chunks
-SECONDS_OF_DELAY = 1e-2  # CPU time (s) to count the roots of a rig with delay, measured; only sets the size of chunks
-PROBES = 64  # points at which the cost of a map is estimated; chosen by trial
+SECONDS_A_STEP = 4e-8  # s, measured CPU time of an integration step in a lane; only sets the size of chunks
+SECONDS_OF_DELAY = 1e-2  # s, measured CPU time to count the roots of a rig with delay; only sets the size of chunks
+PROBES = 64  # number of points at which the cost of a map is estimated; chosen by trial
 NOT_DONE = -1  # integer stored at points that are not computed yet
 NOT_SLIDING = "no steady sliding, or out of range"
 """`Output.missing` of results that need steady sliding; the result `status` distinguishes the two reasons."""
@@ -160,7 +160,7 @@ def _leading(point: OperatingPoint) -> Any:
     with np.errstate(all="ignore"):
         first = np.argmax(np.where(np.isnan(found.real), -np.inf, found.real), axis=-1)
         s = np.take_along_axis(found, first[..., None], axis=-1)[..., 0]
-        # ill-posed rigs, and rigs without steady sliding, have no frequency
+        # rigs that are ill-posed or have no steady sliding have no frequency
         s = np.where(is_ill_posed(point) | np.isnan(s.real), complex(np.nan, np.nan), s)
         return np.stack([np.abs(s.imag) / (2 * np.pi), -s.real / np.abs(s)], axis=-1)
 
@@ -215,7 +215,7 @@ class Events(Measure, name="events"):
 
     def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
         found = self._run(rig, protocol, probes)
-        return float(np.mean(found.steps + found.rejected)) * SECONDS_A_STEP + 1e-6  # to set a run up
+        return float(np.mean(found.steps + found.rejected)) * SECONDS_A_STEP + 1e-6  # 1 µs to prepare a run
 
     def _run(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Any:
         seen = tuple(f"{name}.normal_force" for name in rig.contact_names)
@@ -340,7 +340,7 @@ def source_digest(thing: Any) -> str:
         written = thing if inspect.isroutine(thing) or isinstance(thing, type) else type(thing)
         try:
             text = inspect.getsource(written)
-        except (OSError, TypeError):  # without source: typed at a prompt, or compiled
+        except (OSError, TypeError):  # there is no source code: typed at a prompt, or compiled
             code = getattr(thing, "__code__", None)
             text = repr((code.co_code, code.co_consts, code.co_names)) if code else repr(written)
         held = [getattr(thing, name, None) for name in ("__defaults__", "__kwdefaults__")]

@@ -17,7 +17,7 @@ from steadyslip.maps.plan.axes import COMPLETE
 
 METADATA = 2**26
 """Largest size of a metadata file, bytes; chosen by trial, far above those of any map."""
-_HEAD, _OVERHEAD = 16, 64  # bytes of Blosc's header, and upper bound of what codecs add to a chunk
+_HEAD, _OVERHEAD = 16, 64  # bytes: length of Blosc's header, and upper bound of what codecs add to a chunk
 
 
 class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr's types are not checked
@@ -43,11 +43,11 @@ class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr's types are not check
         except (FileNotFoundError, NotADirectoryError):
             return
         if stat.S_ISDIR(found.st_mode):
-            return  # Zarr treats it as missing
+            return  # Zarr treats the file as missing
         check_kind(str(path), found)
         most = METADATA
         if "/c/" in key:
-            most = self.sizes.get(key.split("/")[0], 0) + _OVERHEAD  # file of a chunk; 64 bytes for unknown arrays
+            most = self.sizes.get(key.split("/")[0], 0) + _OVERHEAD  # limit of a chunk's file; unknown arrays: 64 bytes
         if found.st_size > most:
             raise UnreadableFile(str(path), f"it has {found.st_size} bytes; allowed: {most}")
 
@@ -57,7 +57,7 @@ class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr's types are not check
         if found is None or "/c/" not in key or not self.sizes.get(name):
             return found
         content = found.to_bytes()
-        if name == COMPLETE:  # marks are not compressed
+        if name == COMPLETE:  # the marks of finished chunks are not compressed
             if len(content) != self.sizes[name]:
                 raise UnreadableFile(str(self.root / key), "it is damaged, a mark has another size")
             return found

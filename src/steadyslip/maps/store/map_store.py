@@ -31,7 +31,7 @@ from steadyslip.maps.plan.axes import COMPLETE, SAMPLE
 from steadyslip.maps.plan.map import Map, differences
 from steadyslip.maps.store.store_layout import coordinates, lay_out, read_layout
 
-_CHECKSUM_OFFSET = 1 << 32  # bit set in every checksum, so that none is zero, the fill value of marks
+_CHECKSUM_OFFSET = 1 << 32  # a bit that is set in every checksum, so that no checksum is zero, the fill value of marks
 _MARK = 8  # size of a mark, bytes
 
 
@@ -67,7 +67,7 @@ class Store:
         except (OSError, KeyError, ValueError, TypeError) as error:
             raise self.damage("zarr.json", error) from error
         self._arrays: dict[str, Any] = {}
-        self._intact: set[int] = set()  # chunks whose checksum was verified
+        self._intact: set[int] = set()  # numbers of the chunks whose checksum was verified
 
     def array(self, name: str) -> Any:
         """Zarr array by name (cached)."""
@@ -225,7 +225,7 @@ class Store:
             return
         for entry in entries:
             if not entry.name.isdecimal() or len(entry.name) > 9 or int(entry.name) >= self.grid[len(at)]:
-                continue  # a temporary file of a killed process
+                continue  # a temporary file left by a killed process
             here = (*at, int(entry.name))
             if len(here) == len(self.grid):
                 found[here] = self._mark_in(Path(entry.path))
@@ -245,7 +245,7 @@ class Store:
         return int.from_bytes(content, "little") if len(content) == _MARK else 0
 
     def _has_samples(self, number: int) -> bool:
-        """True if this chunk, among those with the same samples, is the one that stores the sample parameters."""
+        """True if this chunk stores the sample parameters; of several chunks with the same samples only one does."""
         indices = np.unravel_index(number, self.grid)
         return bool(self.generated) and not any(int(i) for i in indices[:-1])
 
@@ -277,7 +277,7 @@ class Store:
             shutil.rmtree(folder, ignore_errors=True)
 
     def restore(self, plan: Map) -> None:
-        """Write coordinates that are damaged again (marks cover only chunks)."""
+        """Write damaged coordinates again; unlike chunks, coordinates have no checksum."""
         for name, values in coordinates(plan).items():
             inside(self.path, f"{name}/c/0")
             try:
@@ -308,7 +308,7 @@ class Store:
                 if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
                     message = f"another run is working on {str(self.path)!r}; wait for it, or end it first"
                     raise NotAvailable(message) from error
-            yield  # also if this file system has no locks
+            yield  # go on even if this file system has no locks
 
     def refuse_another_program(self) -> None:
         """Raise an error if another version of this program computed the map, because versions must not be mixed.
@@ -365,7 +365,7 @@ def _create(path: Path, plan: Map) -> None:
         os.rename(new, path)
     except Exception as error:
         shutil.rmtree(new, ignore_errors=True)
-        if path.exists():  # created by another process meanwhile
+        if path.exists():  # another process has created the store meanwhile
             return
         if isinstance(error, OSError):
             raise cannot_write(path, error) from error

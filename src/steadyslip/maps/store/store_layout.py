@@ -29,14 +29,14 @@ from steadyslip.maps.plan.measures import NOT_DONE
 from steadyslip.maps.store.folder import METADATA
 
 FORMAT = 2  # version number of the layout
-MOST_CHUNK = 2**30  # largest chunk of one array, bytes: fits into the memory of any machine
-MOST_EXTRA = 1000  # largest number of values of a result at one point; chosen by trial, far above any measure's
+MOST_CHUNK = 2**30  # bytes, largest chunk of one array: fits into the memory of any machine
+MOST_EXTRA = 1000  # largest number of values of a result at one point; chosen by trial, far more than any measure has
 _VERSIONS = ("numpy", "scipy", "llvmlite", "zarr")
 _TEXTS = ("title", "rig", "rig_file", "definition", "dims", "results", "steadyslip", "versions", "coordinates",
           "seal")  # fmt: skip
 _ARRAY = {"shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs", "attributes",
           "dimension_names", "zarr_format", "node_type", "storage_transformers"}  # fmt: skip
-_FILL = {"float64": np.nan, "int8": NOT_DONE, "uint64": 0}  # fill values: nothing computed
+_FILL = {"float64": np.nan, "int8": NOT_DONE, "uint64": 0}  # fill values, which mean that nothing is computed yet
 _PACKED, _PLAIN = ("bytes", "blosc", "crc32c"), ("bytes",)
 
 
@@ -143,7 +143,7 @@ def _layout(document: Any) -> MapLayout:
     _require(fits_form(document, {"attributes": dict, "zarr_format": int, "consolidated_metadata": dict,
                                  "node_type": str}), "it is no Zarr group of format 3")  # fmt: skip
     _require((document["zarr_format"], document["node_type"]) == (3, "group"), "it is no Zarr group of format 3")
-    attributes = {"rig_file": ""} | document["attributes"]  # earlier versions did not store rig_file
+    attributes = {"rig_file": ""} | document["attributes"]  # maps of earlier versions have no rig_file
     _require("steadyslip_map" in attributes, "it has no steadyslip_map")
     version = attributes["steadyslip_map"]
     _require(version == FORMAT, f"its layout has version {version!r:.20}, and this program reads version {FORMAT}")

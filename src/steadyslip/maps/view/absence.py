@@ -12,7 +12,7 @@ from steadyslip.maps.view.cut import View
 from steadyslip.maps.view.map_result import MapResult
 from steadyslip.model.point import operating_point
 
-ASKED = 12  # largest number of points that are analysed for an explanation; chosen by trial
+ASKED = 12  # largest number of points that are analysed to explain missing values; chosen by trial
 _REASONS = {
     ABSENT: WORDS[ABSENT],
     UNKNOWN: WORDS[UNKNOWN],

@@ -28,7 +28,7 @@ from steadyslip.maps.view.map_result import MapResult
 MOST = 500  # largest number of points along an axis: more than a figure resolves
 MOST_IN_ALL = 2 * 10**7  # largest number of values read, samples included: 160 MB
 MOST_SCATTERED = 5000  # largest number of points of a scatter plot; chosen by trial: more would overlap
-BAND = (0.025, 0.5, 0.975)  # quantiles of samples: median and 95 % band
+BAND = (0.025, 0.5, 0.975)  # quantiles of samples that are computed: ends of the 95 % band, and median
 FAILING = ("safety_factor", "margin")
 """Results without a value at samples that are stable at all stiffnesses, or fail (stable at none, no sliding)."""
 
@@ -181,7 +181,10 @@ def _stable_samples(found: MapResult, part: Any, order: Sequence[str]) -> Array 
 
 
 def _with_failures(numbers: Array, stable: Array | None, result: str) -> tuple[Array, Array]:
-    """Values with missing ones replaced (failed: lowest; stable without edge: infinite), and share of failures."""
+    """Values with missing values replaced, and share of failures.
+
+    A failed sample gets the lowest value, a stable sample without an edge an infinite value.
+    """
     none = ~np.isfinite(numbers)
     always = np.zeros_like(none) if stable is None else none & stable
     failed = none & ~always
@@ -192,7 +195,7 @@ def _with_failures(numbers: Array, stable: Array | None, result: str) -> tuple[A
 def _quantiles(numbers: Array, axis: int) -> Array:
     """Quantiles `BAND` along an axis, of all values but NaN; NaN where all values are NaN; (3, ...)."""
     empty = np.all(np.isnan(numbers), axis=axis, keepdims=True)
-    # with infinite values take one of the samples, because interpolation with infinity is undefined
+    # with infinite values, quantiles are values of samples, because interpolation with infinity is undefined
     method: Any = "closest_observation" if np.isinf(numbers).any() else "linear"
     found = np.nanquantile(np.where(empty, 0.0, numbers), BAND, axis=axis, method=method)
     return np.asarray(np.where(np.squeeze(empty, axis), np.nan, found))

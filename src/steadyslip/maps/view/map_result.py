@@ -116,7 +116,7 @@ class MapResult(Displayed):
                 decode_times=False,
                 mask_and_scale=False,
             )
-        except (ValueError, RuntimeError, OSError) as error:  # coordinates are read immediately
+        except (ValueError, RuntimeError, OSError) as error:  # coordinates are read at this point
             raise self._store.damage("coordinates", error) from error
         return lazily(data, self._store)
 
@@ -192,7 +192,7 @@ class MapResult(Displayed):
         extra = int(np.prod(store.layout.arrays[name].shape[len(self.dims) :], dtype=int))
         rest = [int(np.prod(self.shape[axis + 1 :], dtype=int)) * extra for axis in range(len(self.dims))]
         axis = next(i for i, n in enumerate(rest) if n * store.chunks[i] <= BLOCK or i + 1 == len(rest))
-        several = max(1, BLOCK // (store.chunks[axis] * rest[axis]))  # chunks along that axis
+        several = max(1, BLOCK // (store.chunks[axis] * rest[axis]))  # chunks along that axis in a block
         for outer in np.argwhere(marks.any(axis=tuple(range(axis, marks.ndim)))):
             before = tuple(slice(int(i) * c, (int(i) + 1) * c) for i, c in zip(outer, store.chunks, strict=False))
             own = marks[tuple(outer)]

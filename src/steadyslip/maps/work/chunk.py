@@ -86,7 +86,7 @@ def do_chunk(job: Job, number: int) -> Done:
             return Done(number, 0, 0.0, message)
         store = _open_store(job.path, _stamp(job.path))
         points = store.points(number)
-        if store.is_done(number):  # a worker that was believed lost has computed it
+        if store.is_done(number):  # a worker that was believed to be lost has computed the chunk
             return Done(number, points, 0.0)
         region = store.region(number)
         vary = store.parameters(region)
@@ -129,7 +129,7 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD 
 
 @lru_cache(maxsize=4)
 def _open_store(path: str, stamp: tuple[int, int]) -> Store:
-    """Opened store, cached between chunks; `stamp` changes when the store is replaced by another at its path."""
+    """Opened store, cached between chunks; `stamp` changes if another store replaces the one at `path`."""
     return Store(Path(path))
 
 

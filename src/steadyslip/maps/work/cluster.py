@@ -17,15 +17,15 @@ from steadyslip.maps.store.map_store import Store
 from steadyslip.maps.work.chunk import Done, Job, do_chunk, reuse_memory
 
 LOCAL = "local"
-PATIENCE = 3  # number of workers that die on the same chunk before the run is given up
-WAIT = 600.0  # s without a finished chunk before a lost scheduler is given up; restarts take minutes
+PATIENCE = 3  # a run is given up if this many workers die on the same chunk
+WAIT = 600.0  # s; a lost scheduler is given up after this time without a finished chunk; restarts take minutes
 COUNT = 5.0  # s between counts of the workers, whose number may change
 RETRY = 2.0  # s between attempts to connect
-CONNECT = 30.0  # s to wait for an answer; Dask's own default
+CONNECT = 30.0  # s, longest time to wait for a connection; Dask's own default
 
 
 class _Lost(Exception):
-    """The scheduler has lost tasks."""
+    """Error: the scheduler has lost tasks."""
 
 
 def run_cluster(
@@ -69,7 +69,7 @@ def run_cluster(
             note(f"the scheduler at {address!r} is lost; trying again")
             time.sleep(RETRY)
             pending = set(store.pending())
-            for number in [n for n in left if n not in pending]:  # finished, but not reported
+            for number in [n for n in left if n not in pending]:  # these chunks are finished, but were not reported
                 left.remove(number)
                 report(Done(number, store.points(number), 0.0))
 

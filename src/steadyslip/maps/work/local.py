@@ -18,7 +18,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.progress import interrupts_held
 from steadyslip.maps.work.chunk import Done, Job, do_chunk, reuse_memory
 
-PATIENCE = 8  # worker pools that die in a row without a finished chunk before the run is given up; chosen by trial
+PATIENCE = 8  # a run is given up if so many worker pools in a row die without a finished chunk; chosen by trial
 WATCH = 0.5  # s between a worker's checks that its parent is alive
 
 
@@ -86,7 +86,7 @@ def _workers(count: int) -> Iterator[Any]:
     from loky.backend import resource_tracker as loky_tracker
 
     if hasattr(signal, "pthread_sigmask"):
-        for tracker in (resource_tracker, loky_tracker):  # if started later, they would unblock SIGINT
+        for tracker in (resource_tracker, loky_tracker):  # started later, these processes would unblock SIGINT
             tracker.ensure_running()
     with _interrupts_blocked():
         pool = ProcessPoolExecutor(count, initializer=_set_up_worker, initargs=(os.getpid(),))

@@ -22,7 +22,7 @@ from steadyslip.maps.work.cluster import run_cluster
 from steadyslip.maps.work.local import run_here, run_local
 from steadyslip.motion.engine import available_cores
 
-SHORT = 2.0  # s; less work than this is done in this process, because further ones take a second to start
+SHORT = 2.0  # s; less work than this is done in this process, because further processes take a second to start
 
 
 @checked()

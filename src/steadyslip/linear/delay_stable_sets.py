@@ -92,7 +92,10 @@ def delay_set_among(c: Array, h: Array, sets: Sets, late: NDArray[np.bool_], spa
 
 
 def _set_of_cells(edges: Array, frequencies: Array, stable: NDArray[np.bool_]) -> StableSet:
-    """Stable set from candidate edges (e,) with their frequencies, and stability of the cells between, (e + 1,)."""
+    """Stable set made of the cells between candidate edges (e,) with their frequencies.
+
+    `stable` (e + 1,) is by cell.
+    """
     changes = stable[1:] != stable[:-1]
     edges, frequencies = edges[changes], frequencies[changes]
     ends = np.concatenate([[0.0] if stable[0] else [], edges, [np.inf] if stable[-1] else []])
@@ -293,9 +296,9 @@ def _last_crossing(c: Array) -> Array:
 def _candidates(
     p: Array, q: Array, h: Array, low: float, high: float, fast: float, ill_posed: Array
 ) -> tuple[Array, Array] | None:
-    """Values of θ at which a root may be on the axis, rising, and its frequency: 0 at s = 0, inf at infinite s.
+    """Values of θ at which a root may be on the axis, rising, with the frequency of the root.
 
-    Roots are at infinite s where the equations become `ill_posed`.
+    The frequency is 0 for a root at s = 0, and inf where the equations become `ill_posed` (the root is infinite).
     """
     zeros = im_of_product(p, q, h).zeros(fast) if fast else (np.empty(0),)
     if zeros is None:

@@ -118,7 +118,10 @@ def _split(c: Array) -> tuple[Array, Array, Array]:
 
 
 def _with_far_edges_removed(found: StableSet) -> StableSet:
-    """Stable set with edges beyond the factor `_FAR` moved to 0 or infinity; edges are multiples of a size near 1."""
+    """Stable set in which edges beyond the factor `_FAR` are moved to 0 or infinity.
+
+    Edges are multiples of a size near 1.
+    """
     ends = np.where(found.intervals < 1 / _FAR, 0.0, np.where(found.intervals > _FAR, np.inf, found.intervals))
     ends = np.where((ends[..., :1] < ends[..., 1:]), ends, np.nan)
     order = np.argsort(np.isnan(ends[..., 0]), axis=-1, kind="stable")  # empty intervals last

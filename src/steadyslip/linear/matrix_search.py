@@ -118,7 +118,7 @@ class MatrixSearch:
         return len(self.own.along(self.name, np.array([self.value])).a[0])
 
     def parts(self, count: int) -> list[slice]:
-        """Slices of `count` machines that are treated together."""
+        """Slices that divide `count` machines into parts that are treated together."""
         together = max(_TOGETHER // self._rows**2, 1)
         return [slice(start, start + together) for start in range(0, count, together)]
 
@@ -173,7 +173,7 @@ class MatrixSearch:
     # -- edges
 
     def boundaries(self, between: tuple[float, float] | None = None) -> tuple[Boundary, ...]:
-        """Edges in a range, by default in `searched`, rising."""
+        """Edges in the range `between`, by default in `searched`, by rising value."""
         with np.errstate(all="ignore"):
             if not self.own.balance.exists:
                 return self._scanned(between)
@@ -259,7 +259,7 @@ class MatrixSearch:
         return [self._described(end, 0.0, below, status), *after]
 
     def _described(self, value: float, beta: float, below: int, above: int) -> Boundary:
-        """Make the Boundary at a value; where steady sliding ends, its kind is the condition that fails."""
+        """The Boundary at a value; its kind at an end of steady sliding is the condition that fails."""
         if ABSENT not in (below, above):
             return self._boundary(value, "oscillatory" if beta else "divergence", beta, below, above)
         step = -_APART if below == ABSENT else _APART

@@ -74,7 +74,7 @@ class MeasuredSearch:
         return UNKNOWN if growing is None else UNSTABLE if growing else STABLE
 
     def boundaries(self, between: tuple[float, float] | None = None) -> tuple[Boundary, ...]:
-        """Edges in a range, by default in `searched`, rising."""
+        """Edges in the range `between`, by default in `searched`, by rising value."""
         grid = self._grid(between)
         status = np.array([self._status(float(one)) for one in grid])
         sure = np.flatnonzero(status != UNKNOWN)

@@ -79,12 +79,12 @@ class ModeChart(Displayed):
 
     @property
     def is_geometric(self) -> bool:
-        """True if the values are spaced evenly in their logarithm, as for a wide range."""
+        """True if the values are spaced evenly in their logarithm, which is the case for a wide range."""
         return _is_wide(float(self.values[0]), float(self.values[-1]))
 
     @property
     def least_damped(self) -> tuple[int, ...]:
-        """Columns of the (at most eight) oscillations with the smallest damping ratios, by rising frequency."""
+        """Columns of the oscillations (at most eight) with the smallest damping ratios, by rising frequency."""
         least = np.nanmin(self.damping_ratios, axis=0)
         kept = np.sort(np.argsort(least)[:MOST])
         return tuple(int(i) for i in kept)
@@ -114,7 +114,7 @@ class ModeChart(Displayed):
         }
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write one row for each value of the parameter, units in the header.
+        """Write a CSV file with one row for each value of the parameter; the header has the units.
 
         Raises
         ------

@@ -87,7 +87,7 @@ class Modes(Displayed):
         }
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write one row for each mode, units in the header.
+        """Write a CSV file with one row for each mode; the header has the units.
 
         Raises
         ------
@@ -154,7 +154,7 @@ class Modes(Displayed):
 
 @checked(number=Whole("number of an oscillation, by rising frequency", 1))
 def modes(rig: Slider | Machine, number: int | None = None) -> Modes:
-    """All modes of a machine: frequencies, dampings, shapes, energies; what feeds growth, and what to change.
+    """All modes of a machine: frequencies, dampings, shapes, energies, cause of growth, and effects of changes.
 
     Parameters
     ----------

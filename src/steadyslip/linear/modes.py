@@ -253,7 +253,7 @@ class EnergyStore:
 
 
 def stores(mechanism: Mechanism) -> list[EnergyStore]:
-    """Kinetic and elastic energy stores of a mechanism, in numbers or symbols; one name may have several."""
+    """Energies of the bodies, links and contacts of a mechanism, in numbers or symbols; one name may have several."""
     names = {one.name for one in mechanism.coordinates}
     names |= {name for part in mechanism.structures for name in part.coordinates}
     found = [

@@ -196,7 +196,7 @@ def columns(c: Array) -> list[Array]:
 
 
 def even_odd(c: Array) -> tuple[Array, Array]:
-    """E and O with c(iβ) = E(β²) + iβ O(β²), as polynomials in β²."""
+    """Polynomials E and O in β² with c(iβ) = E(β²) + iβ O(β²)."""
     even, odd = crossing.even_odd(columns(c))
     return np.stack(even, axis=-1), np.stack(odd, axis=-1)
 
@@ -218,7 +218,7 @@ def squared_size(c: Array) -> Array:
 
 @quietly
 def crossing_squares(p: Array, q: Array) -> Array:
-    """Positive β² where p(iβ)/q(iβ) is real, NaN padded: the roots of Im[p conj q]/β."""
+    """Positive β² at which p(iβ)/q(iβ) is real, padded with NaN: the roots of Im[p conj q]/β."""
     difference = np.stack(np.broadcast_arrays(*crossing.axis_polynomial(columns(p), columns(q))), axis=-1)
     keep = np.any(difference != 0, axis=0)
     if not np.any(keep[1:]):

@@ -138,7 +138,7 @@ def count_right_if_feasible(
 
 
 def crossings(p: Array, q: Array) -> tuple[Array, Array, Array]:
-    """Frequencies ω with |p(iω)| = |q(iω)|, falling, NaN padded; directions; and phases, each (rigs, n).
+    """Frequencies ω with |p(iω)| = |q(iω)|, falling, padded with NaN; directions; phases; (rigs, n) each.
 
     As the delay h grows, a pair of roots of p + q exp(−sh) crosses the axis at ±iω whenever ω h = φ + 2πk, with the
     phase φ in (0, 2π]; the direction is +1 if it crosses to the right, −1 if to the left.
@@ -172,7 +172,7 @@ def _count_by_crossings(p: Array, q: Array, h: Array) -> NDArray[np.int64]:
 
 
 def too_long(turns: float) -> NotAvailable:
-    """Error for delays of up to `turns` periods of the rig's oscillations."""
+    """Error for delays that last up to `turns` periods of the rig's oscillations."""
     return NotAvailable(
         f"the delays are so long beside the oscillations of this rig, up to {turns:.2g} turns, that its growing roots "
         "cannot be counted; shorten them"

@@ -30,7 +30,7 @@ from steadyslip.model.range import in_range, require_range, warn_of_range
 
 @dataclass(frozen=True)
 class Response(Displayed):
-    """Ingredients of the cubic, per unit area: SymPy expressions from `response`, numbers from `small_signal`.
+    """Quantities of the paper's cubic, per unit area: SymPy expressions from `response`, numbers from `small_signal`.
 
     Attributes
     ----------

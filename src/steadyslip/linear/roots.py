@@ -42,14 +42,14 @@ def quietly(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def degrees(c: Array) -> NDArray[np.int64]:
-    """Degree of each polynomial, −1 for zero and for non-finite coefficients."""
+    """Degree of each polynomial; −1 for the polynomial 0 and for coefficients that are not finite."""
     present = (c != 0) & np.all(np.isfinite(c), axis=-1, keepdims=True)
     top = c.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
     return np.asarray(np.where(np.any(present, axis=-1), top, -1))
 
 
 def evaluate(c: Any, s: Any) -> Any:
-    """Value at `s` of polynomials; `c` (..., n+1) against `s` (...)."""
+    """Values at `s` (...) of polynomials with coefficients `c` (..., n+1)."""
     value = np.zeros_like(s) + c[..., -1]
     for i in range(c.shape[-1] - 2, -1, -1):
         value = value * s + c[..., i]
@@ -187,7 +187,7 @@ def _scaled(s: ComplexArray, exponent: NDArray[np.int64]) -> ComplexArray:
 
 
 def _close_pair(c: Array, one: ComplexArray, other: ComplexArray) -> ComplexArray:
-    """Two roots close to each other, from their common factor s² + u s + w by Bairstow's iteration."""
+    """Two roots that are close to each other, from their common factor s² + u s + w by Bairstow's iteration."""
     size = np.abs(one).astype(np.longdouble)
     scaled = c.astype(np.longdouble) * size[:, None] ** np.arange(c.shape[-1])
     start = one / size.astype(float), other / size.astype(float)

@@ -26,7 +26,7 @@ _LARGEST = 300  # largest exponent of ten of a sample: doubles end at 308
 
 
 def bounded(domain: Domain, share: int) -> Array:
-    """Samples of a parameter with a bounded domain: evenly spaced, and geometrically closer towards both ends.
+    """Samples of a parameter with a bounded domain: evenly spaced, and geometrically closer to both ends.
 
     `share` divides the number of samples.
     """
@@ -40,7 +40,7 @@ def bounded(domain: Domain, share: int) -> Array:
 
 
 def unbounded(domain: Domain, zero: bool, size: float, least: float, most: float, share: int) -> Array:
-    """Samples spaced geometrically around `size`, from `least` to `most`, of both signs if the domain has both.
+    """Samples spaced geometrically around `size`, from `least` to `most`; of both signs if the domain has both.
 
     With `zero` the value 0 is included; `share` divides the number of samples.
     """

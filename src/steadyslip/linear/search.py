@@ -135,7 +135,7 @@ class Search:
 
     @cached_property
     def searched(self) -> tuple[float, float]:
-        """Default range: from the first to the last sample at which a rig can be built."""
+        """Default range of the search: from the first to the last sample at which the rig can be built."""
         grid, point = self._usual
         built = grid[np.broadcast_to(point.valid, grid.shape)]
         return float(built[0]), float(built[-1])
@@ -147,7 +147,7 @@ class Search:
 
     @property
     def on_the_grid(self) -> OperatingPoint:
-        """Operating point of the rig at all values of the default grid at which it can be built."""
+        """Operating point of the rig at those values of the default grid at which the rig can be built."""
         grid, point = self._usual
         valid = np.broadcast_to(point.valid, grid.shape)
         return point if np.all(valid) else self.values(grid[valid])
@@ -195,7 +195,7 @@ class Search:
         return nearness(self.values(np.asarray(x, dtype=float)))
 
     def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
-        """Edges in a range, by default in `searched`, rising."""
+        """Edges in the range `between`, by default in `searched`, by rising value."""
         with np.errstate(all="ignore"):
             low, high = self.searched if between is None else between
             exact = self._exact(between)
@@ -313,7 +313,7 @@ class Search:
     def _narrowed(
         self, low: Array, high: Array, low_kind: NDArray[np.int64], high_kind: NDArray[np.int64]
     ) -> tuple[Array, Array]:
-        """Brackets narrowed to rounding around the lowest change of status, or of kind where the status is equal."""
+        """Brackets narrowed to rounding around the lowest change of status or, if the status is equal, of kind."""
         low, high = low.copy(), high.copy()
         judged = (low_kind - high_kind) % _BESIDE != 0
         for rows, asked in ((np.flatnonzero(judged), self.status), (np.flatnonzero(~judged), self.kinds)):
@@ -460,5 +460,5 @@ def _decay_function(model: Model) -> ArrayFunction:
 
 
 def _decay_rate(point: OperatingPoint) -> float:
-    """Fastest decay rate of the memory (1/s), zero without memory."""
+    """Fastest decay rate (1/s) of all memory variables; zero without memory."""
     return max((abs(float(rate)) for rate in point.evaluate(_decay_function(point.model))), default=0.0)

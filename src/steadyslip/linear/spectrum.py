@@ -128,7 +128,9 @@ def among_many(point: OperatingPoint, found: ComplexArray) -> NDArray[np.bool_]:
 
 
 def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
-    """Dotted names of the delays that make a single rig ill-posed; empty if well posed, or ill-posed without them too.
+    """Dotted names of the delays that make a single rig ill-posed.
+
+    Empty if it is well posed, or ill-posed without delays too.
 
     A delay makes a rig ill-posed if, on a body without mass, delayed terms outweigh undelayed ones.
     """
@@ -188,7 +190,9 @@ def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:
 
 @quietly
 def distance_from_axis(point: OperatingPoint) -> Array:
-    """Distance of the rightmost root from the imaginary axis, relative to its size, (...); NaN where none is known.
+    """Distance of the rightmost root from the imaginary axis over the size of the root, (...).
+
+    NaN where no root is known.
 
     With one delay the phase (rad) to the nearest crossing, which is at least as large; inf where other roots grow.
     """

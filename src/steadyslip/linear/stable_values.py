@@ -25,7 +25,7 @@ from steadyslip.model.range import require_range
 
 @checked()
 def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) -> Any:
-    """All values of a parameter at which steady sliding is stable, exactly.
+    """All values of a parameter at which steady sliding is stable, as exact intervals.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def intervals_along(rig: Slider | Machine, name: str, vary: Vary | None) -> Arra
 
 
 def stable_intervals(point: OperatingPoint, name: str) -> Array:
-    """Stable intervals of one parameter for arrays of rigs, SI units, (..., m, 2), NaN padded.
+    """Stable intervals of one parameter for arrays of rigs, SI units, (..., m, 2), padded with NaN.
 
     Raises
     ------

@@ -40,7 +40,7 @@ def jacobian(rig: Slider | Machine) -> Array:
 def state_matrices(
     rig: Slider | Machine, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None
 ) -> Matrices:
-    """A, B, C, D for outputs and inputs by name; see `state_space`.
+    """State-space matrices A, B, C, D for outputs and inputs given by name; see `state_space`.
 
     Raises
     ------

@@ -100,7 +100,7 @@ def status(point: OperatingPoint) -> NDArray[np.int64]:
 
 
 def status_where_counted(point: OperatingPoint) -> NDArray[np.int64]:
-    """Status of rigs (...) as `status`, but UNKNOWN where roots under delays cannot be counted (`status` raises)."""
+    """Result of `status`, but UNKNOWN where roots under delays cannot be counted (`status` raises then)."""
     with np.errstate(all="ignore"):
         return np.where(can_be_counted(point), _status(point, is_stable(point, unless_long=True)), UNKNOWN)
 
@@ -144,7 +144,7 @@ def _static_terms(model: Model) -> ArrayFunction:
 
 @cached
 def is_neutral(point: OperatingPoint) -> NDArray[np.bool_]:
-    """True where the static stiffness is zero to 9 digits, relative to its terms."""
+    """True where the static stiffness is zero, to 9 digits of its terms."""
     if has_closed_form(point.model):
         part = response_numbers(point)
         terms = [part.k * np.ones(point.shape), part.mu * part.k * part.B2, part.mu * part.B3]

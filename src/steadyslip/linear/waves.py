@@ -61,7 +61,9 @@ class Waves:
         return Waves(self.shift * unit, a / size, b / size)
 
     def zeros(self, highest: float) -> tuple[Array, Array] | None:
-        """All zeros in (0, `highest`], rising, and the sign of the slope at each; None if too many to separate.
+        """All zeros in (0, `highest`], rising, and the sign of the slope at each zero.
+
+        None if zeros are too many to separate.
 
         The sign is 0 where the function touches zero within rounding.
         """
@@ -164,7 +166,10 @@ def im_of_product(p: Array, q: Array, h: Array) -> Waves:
 
 
 def difference_of_squares(a: Array, ha: Array, b: Array, hb: Array) -> Waves:
-    """Function |A(iω)|² − |B(iω)|², zero where A and B are equal in size; a, b (m, n+1) with delays ha, hb (m,)."""
+    """The function |A(iω)|² − |B(iω)|², which is zero where A and B are equal in size.
+
+    A, b (m, n+1) with delays ha, hb (m,).
+    """
     return _sum_of_terms(
         [(d, z.real, z.imag, size) for d, z, size in _products(a, ha, a, ha)]
         + [(d, -z.real, -z.imag, size) for d, z, size in _products(b, hb, b, hb)]

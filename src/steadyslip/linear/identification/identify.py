@@ -213,7 +213,7 @@ class _Known:
 
     @property
     def flat(self) -> tuple[ComplexArray, Array]:
-        """Responses and weights with one column per pair of directions, (p, c) each."""
+        """Responses and weights with one column for each pair of directions, (p, c) each."""
         return self.response.reshape(len(self.omega), -1), self.weight.reshape(len(self.omega), -1)
 
     def described(self) -> tuple[ModalSum, float]:
@@ -254,7 +254,10 @@ class _Known:
         return np.asarray(found * (max(square, 1.0) if self.has_errors else square))
 
     def _criterion(self, poles: ComplexArray) -> tuple[float, Array]:
-        """Criterion of Schwarz for best residues at given poles, −inf for an exact fit; and squared residuals (p,)."""
+        """Criterion of Schwarz with the best residues for given poles, −inf for an exact fit.
+
+        And squared residuals (p,).
+        """
         found, rest = residues(self.omega, *self.flat, poles)
         near, far = (1 / (1j * self.omega[:, None] - one) for one in (poles, poles.conj()))
         response, weight = self.flat
@@ -291,7 +294,7 @@ class _Known:
         return ModalSum(table[:, 0], table[:, 1:], 0.5 * (square + square.T))
 
     def _refined(self, begin: ModalSum) -> ModalSum:
-        """Sum of modes refined by nonlinear least squares from the start `begin`."""
+        """Sum of modes refined by nonlinear least squares, which start from `begin`."""
         from scipy.optimize import least_squares  # slow to import
 
         count, size = begin.shapes.shape

@@ -143,7 +143,7 @@ def _solved(first: complex, second: complex, right: complex | ComplexArray) -> A
 
 
 def modal_machine(machine: Machine) -> ModalMachine:
-    """Machine whose structure is the modes identified from its response.
+    """Machine whose structure is given by the modes identified from its measured response.
 
     Raises
     ------

@@ -102,7 +102,7 @@ class _Structure:
 
 @lru_cache(maxsize=128)
 def _build_cached(structure: _Structure, order: int) -> Model:
-    """Build the Model of a rig structure; `order` > 0 replaces each delay by that many variables, for motion."""
+    """The Model of a rig structure. For `order` > 0 it is for motion, and that many variables replace each delay."""
     rig = structure.rig
     symbols, known = _parameter_symbols(rig, structure.present)
     given = {name: symbol for name, symbol in symbols.items() if symbol.is_Symbol}

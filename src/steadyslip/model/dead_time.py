@@ -30,7 +30,10 @@ USUAL_ORDER = ORDERS[1]  # default number of variables of a late signal
 
 @dataclass(frozen=True)
 class Transport:
-    """Equations τ q' = `matrix` q + `inflow` u and late signal `outflow` q, shapes (n, n), (n,), (n,)."""
+    """Matrices of the equations τ q' = `matrix` q + `inflow` u and of the delayed signal `outflow` q.
+
+    (n, n), (n,), (n,).
+    """
 
     matrix: NDArray[np.float64]
     inflow: NDArray[np.float64]
@@ -39,7 +42,7 @@ class Transport:
 
 @cache
 def transport(order: int) -> Transport:
-    """Equations of transport over the unit interval by `order` orthonormal Legendre polynomials, in real Schur form."""
+    """Matrices of transport over the unit interval, by `order` orthonormal Legendre polynomials, in Schur form."""
     from scipy.linalg import schur  # slow to import
 
     k = np.arange(order)

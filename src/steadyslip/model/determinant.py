@@ -28,7 +28,7 @@ MAX_TERMS = 4000
 
 
 class TooManyTerms(Exception):
-    """A determinant exceeds the allowed number of terms."""
+    """Raised if a determinant exceeds the allowed number of terms."""
 
 
 class Placeholders:
@@ -234,7 +234,7 @@ def _substituted(
     values: list[Polynomial | None],
     factors: list[sp.Expr],
 ) -> Polynomial:
-    """Sum of all terms with the symbols of contacts replaced by their polynomials, contact by contact.
+    """Sum of all terms in which the symbols of contacts are replaced by their polynomials, contact by contact.
 
     Every term contains exactly one symbol of each contact; `levels` has the indices of these symbols by contact.
     """
@@ -265,7 +265,7 @@ def sum_of_terms(terms: Terms, factors: list[sp.Expr]) -> sp.Expr:
 
 
 def _nested(terms: Terms, factors: list[sp.Expr], first: int = 0) -> sp.Expr:
-    """Expression of a polynomial in Horner-like form, each factor taken out of the terms that contain it.
+    """Expression of a polynomial in Horner-like form: each factor is taken out of the terms that contain it.
 
     This shortens polynomials of thousands of terms; `terms` are distinct, so none of them cancel.
     """

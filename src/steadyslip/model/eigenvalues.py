@@ -50,7 +50,7 @@ class Matrices:
 
 @dataclass(frozen=True, eq=False)
 class Descriptor:
-    """x' = A x + B u + C z, y = D x + E u + F z, 0 = P x + Q u + R z, in this order.
+    """Equations x' = A x + B u + C z, y = D x + E u + F z, 0 = P x + Q u + R z, with matrices in this order.
 
     x are the states, u the inputs, y the outputs, z the algebraic unknowns. `first` is True for the states that index
     reduction removes first if it can.

@@ -284,7 +284,7 @@ class Forces:
         ))  # fmt: skip
 
     def _late(self, signal: sp.Expr, steady: sp.Expr, delay: Any, unit: str) -> sp.Expr:
-        """Value of a signal a `delay` (s) ago, in a Model for motion."""
+        """Value that a signal had one `delay` (s) ago, in a Model for motion."""
         if self.alternates:
             raise NotAvailable(
                 "creep as a part of a run is not offered with a delay; let creep last for the whole run, or set the "
@@ -297,7 +297,7 @@ class Forces:
         return self.past[-1].late
 
     def _imposed_pull(self, element: Element, name: str) -> sp.Expr:
-        """Force on a coordinate from the imposed force, transmitted by an element."""
+        """Force that an element transmits to a coordinate from the imposed force of the drive."""
         at_drive = element.acts.get(LOAD_POINT, -1)
         return -sp.sympify(element.acts[name]) / at_drive * self.force
 
@@ -413,7 +413,7 @@ class Forces:
         self.definitions |= {site.sigma: law for site, law in zip(self.sites, self.normal, strict=True)}
 
     def _contact_motion(self, site: SymbolicContact) -> ContactInputs:
-        """Arguments of the contact law's methods; also defines T, the pull on the body per contact area."""
+        """Arguments of the contact law's methods; T, the pull on the body per contact area, is defined too."""
         port, body = site.port, next(name for name in site.port.slip if name != LOAD_POINT)
         belt = LOAD_POINT in port.slip  # the body slides on the moving load point and is held by links to the ground
         pulling = self.mechanism.pulling(port)
@@ -450,7 +450,7 @@ class Forces:
         return found + self.push[body.name] / site.port.area
 
     def _balance(self, name: str, inertia: Any) -> sp.Expr | None:
-        """Balance of a coordinate: inertia minus the forces' changes from steady sliding; None for a slider."""
+        """Balance of forces of a coordinate: inertia minus changes of forces from steady sliding; None for a slider."""
         if self.single:
             return None
         total = inertia * self.a[name] - self._pull(name, list(self.mechanism.elements)) - self.push[name]

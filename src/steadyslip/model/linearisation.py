@@ -39,7 +39,7 @@ class Term:
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """Gradients at steady sliding.
+    """Gradients of the equations of a Model at steady sliding.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ def is_written_out(model: Model) -> bool:
 
 @cached
 def delays_of_terms(model: Model) -> list[tuple[sp.Expr, ...]]:
-    """Delays (s) of each term of the characteristic equation, the term without delay first."""
+    """Delays (s) of each term of the characteristic equation, first of the term without delay."""
     return [term.late for term in characteristic_terms(model)] if is_written_out(model) else sets_of_delays(model)
 
 

@@ -64,7 +64,7 @@ def balance_jacobian(model: Model) -> list[list[sp.Expr]]:
 
 
 def vanishing_terms(model: Model) -> list[tuple[sp.Expr, ...]]:
-    """Coefficients of each coordinate whose vanishing lowers the degree in s: first its inertia, then its damping.
+    """Coefficients of each coordinate that lower the degree in s if they are zero: first its inertia, then its damping.
 
     The damping is listed only if no contact determines the velocity and the equations contain inertia or damping. The
     number of zeros over all coordinates is `spare_powers`, except where dampings leave only combinations of velocities
@@ -158,7 +158,7 @@ def _of_contacts(model: Model) -> np.ndarray:
 
 @cached
 def _dissipation_entries(model: Model) -> list[sp.Expr]:
-    """Entries by rows of the damping matrix (n, n), then of the derivatives of slip rates by velocities (contacts, n).
+    """Entries of the damping matrix (n, n), then derivatives of slip rates by velocities (contacts, n), both by rows.
 
     The damping matrix does not contain friction stresses, which are separate unknowns.
     """
@@ -188,7 +188,7 @@ def _determined_in_general(model: Model) -> int:
 
 
 def _determined(values: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """Rank (rigs,) of dampings and contacts on the coordinates `light` (rigs, n); values (entries, rigs)."""
+    """Rank (rigs,) of dampings and contacts on the coordinates `light` (rigs, n); `values` is (entries, rigs)."""
     return np.asarray(np.linalg.matrix_rank(_resistance(values, light), tol=_UNDETERMINED))
 
 

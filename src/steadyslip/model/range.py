@@ -132,7 +132,7 @@ def _finite_slopes(point: OperatingPoint) -> NDArray[np.bool_]:
 
 
 def surely_in_range(point: OperatingPoint, complete: bool) -> bool:
-    """Quick sufficient test that no rig of a point leaves the range of floating point.
+    """True if a quick sufficient test shows that no rig of a point leaves the range of floating point.
 
     True if all parameters have ordinary sizes (`ORDINARY`) and the equations are rational. Otherwise powers and
     exponentials may overflow or underflow, so True only if all results are finite (`complete`) and none underflows.

@@ -276,7 +276,7 @@ class _Reducer:
         return variable.w
 
     def _speed_of(self, coordinate: Coordinate) -> sp.Symbol:
-        """Variable that is integrated for the velocity of a coordinate."""
+        """Variable that is integrated in place of the velocity of a coordinate."""
         index = self.moving.contact_at(coordinate)
         return coordinate.velocity if index is None else self._w(index)
 
@@ -318,7 +318,7 @@ class _Reducer:
         return replaced(replaced(self.inlined(expression), self.accelerations), self.closed)
 
     def _solve_rates(self, heavy: list[Coordinate]) -> None:
-        """Set the rates of all variables, including eliminated memory variables and the w found by balances."""
+        """Set the rates of all variables, also of eliminated memory variables and of w that balances determine."""
         self.raw: Replacements = {}
         for symbol in (
             *(one.displacement for one in self._independent()),
@@ -357,7 +357,7 @@ class _Reducer:
         return sp.Add(*terms, *self._in_time(expression))
 
     def _in_time(self, expression: sp.Expr) -> list[sp.Expr]:
-        """Terms of the time derivative of an expression that come from the inputs."""
+        """Terms of the time derivative of an expression that are due to changing inputs."""
         terms = [derivative(expression, s) * slope_of(s) for s in self.channels]
         return [*terms, derivative(expression, TIME)]
 

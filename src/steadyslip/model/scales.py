@@ -185,7 +185,7 @@ def machine_scales(
 
 
 def shortest_time(scales: Mapping[str, Any], choose: Choose = np.where) -> Any:
-    """Smallest ratio of displacement and velocity scales of a machine (s)."""
+    """Smallest ratio (s) of displacement scale to velocity scale of a machine."""
     own = [name.removesuffix(".x") for name in scales if name.endswith(".x")]
     found: Any = np.inf
     for name in own:

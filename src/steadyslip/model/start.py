@@ -44,7 +44,7 @@ def _number(value: Any) -> Any:
 
 @cached
 def _velocity_variable(reduction: Reduction, index: int) -> ArrayFunction:
-    """Array function of a contact's velocity variable from its slip rate and all memory variables."""
+    """Array function that returns a contact's velocity variable for its slip rate and all memory variables."""
     model, variable = reduction.model, reduction.slidings[index].variable
     if variable is None:
         raise InternalError("the contact to have a velocity variable")

@@ -51,7 +51,7 @@ class SteadyEquation:
 
 @cached
 def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
-    """Equation of the steady normal stress of contact number `place`, or of a slider's contact.
+    """Equation of the steady normal stress of the contact with index `place`, or of a slider's contact.
 
     Raises
     ------
@@ -188,7 +188,7 @@ class CarriedEquation(JointEquation):
         return blocks
 
     def _by_stress(self, blocks: list[Array]) -> tuple[Array, Array]:
-        """Matrix Z (..., n, contacts) and column z0 (..., n, 1) of z = Z σ + z0."""
+        """Matrix Z (..., n, contacts) and column z0 (..., n, 1) with z = Z σ + z0."""
         matrix, rest, by_friction, by_normal, _, _, friction, _, offset = blocks
         right = np.concatenate([by_friction @ friction + by_normal, rest + by_friction @ offset], axis=-1)
         z = solve_all_or_nan(matrix, right)

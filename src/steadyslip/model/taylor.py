@@ -68,7 +68,7 @@ class System:
 
 @cached
 def system(model: Model) -> System:
-    """Differentiate a Model three times at steady sliding.
+    """Equations of a Model with their derivatives up to third order at steady sliding.
 
     Delayed values are separate unknowns, so that equations may be nonlinear in them.
     """
@@ -172,7 +172,7 @@ def arrangements(*index: int) -> tuple[Index, ...]:
 
 
 def taylor(point: OperatingPoint) -> Taylor:
-    """Evaluate the derivatives in steady sliding for every rig of a flat operating point."""
+    """Values of the derivatives in steady sliding for every rig of a flat operating point."""
     found = system(point.model)
     arguments = [np.atleast_1d(np.asarray(one, dtype=float)) for one in (*point.arguments, *point.steady)]
     signs = np.random.default_rng(0).choice((-1.0, 1.0), (ROUNDING_PATTERNS, len(arguments)))

@@ -20,7 +20,7 @@ Column = tuple[sp.Symbol, ...]
 
 @cached
 def with_sensitivities(reduction: Reduction) -> Reduction:
-    """Reduction whose state is y, then S column by column, then D in one direction."""
+    """Reduction whose state is y, then S by columns, then D in one direction."""
     n = len(reduction.state)
     columns = tuple(_column(f"S_{k}", n) for k in range(n))
     return _extended(reduction, columns, (_column("D", n),))

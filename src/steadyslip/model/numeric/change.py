@@ -129,7 +129,7 @@ def frequencies(own: StatePencil, further: tuple[float, ...] = ()) -> Array:
 
 
 class Turns:
-    """Change in the number of growing eigenvalues by a parameter, from turns of Δ around zero."""
+    """Change in the number of growing eigenvalues by a parameter, from the change of Δ's argument with frequency."""
 
     def __init__(self, change: LowRankChange) -> None:
         self.change = change
@@ -165,7 +165,7 @@ class Turns:
         return [float(one) for one in self.omega[inner[np.argsort(size[inner])[:count]]]]
 
     def _ends(self, core: tuple[Array, Array], ratio: ComplexArray) -> float:
-        """Turns (rad) of Δ below the first frequency and above the last, where Δ is nearly real."""
+        """Changes (rad) of Δ's argument below the first frequency and above the last, where Δ is nearly real."""
 
         def to_axis(one: complex) -> float:
             angle = float(np.angle(one))

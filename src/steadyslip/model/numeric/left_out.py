@@ -101,7 +101,7 @@ def alike(some: tuple[StructurePart, ...], others: tuple[StructurePart, ...]) ->
 
 
 def _followed(part: StructurePart, outer: NDArray[np.bool_]) -> Array | None:
-    """Solutions of K_ii X = (K_ik, f_i, −C_i: motion), (i, k + 2); None if the coordinates left out are free."""
+    """Solutions of K_ii X = (K_ik, f_i, −C_i: motion), (i, k + 2). None if nothing holds the coordinates left out."""
     from scipy.linalg import solve  # slow to import
 
     inner = ~outer

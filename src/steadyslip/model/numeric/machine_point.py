@@ -73,7 +73,7 @@ class MachinesAlong:
 
 
 class MachinePoint(HasCache):
-    """A machine in numbers; matrices, steady sliding and pencil are computed on first use."""
+    """A machine given by numbers; matrices, steady sliding and pencil are computed when they are first needed."""
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
@@ -99,7 +99,7 @@ class MachinePoint(HasCache):
         return MachinePoint(with_values(self.machine, {name: value}))
 
     def along(self, name: str, values: Array) -> MachinesAlong:
-        """The machine with several values (p,), SI, of a parameter, which are not checked."""
+        """Machines with the given values (p,), SI, of a parameter, which are not checked."""
         whole = not self.balance.exists  # a machine without steady sliding has no pencil
         matrices = self._matrices_along(name, values, whole)
         found = balances(matrices)
@@ -111,7 +111,7 @@ class MachinePoint(HasCache):
         return MachinesAlong(found, size, e, a, posed, self.pencil, at)
 
     def balances_along(self, name: str, values: Array) -> Balance:
-        """Steady sliding with several values (p,), SI, of a parameter."""
+        """Steady sliding of the machines with the given values (p,), SI, of a parameter."""
         return balances(self._matrices_along(name, values))
 
     def _matrices_along(self, name: str, values: Array, whole: bool = False) -> MachineMatrices:

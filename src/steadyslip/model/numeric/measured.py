@@ -71,7 +71,7 @@ class Count:
 
 
 class ContactStiffness:
-    """G(s) of the contacts of one machine in steady sliding, in their slips and distances, in this order.
+    """Stiffness G(s) of all contacts of a machine in steady sliding, for their slips and distances, in this order.
 
     Raises
     ------
@@ -316,7 +316,7 @@ class MeasuredMachine:
         return np.asarray(np.angle(1 + np.linalg.eigvals(self._seen[..., -1] @ stored[..., 0])))
 
     def _turn_beyond(self, last: complex) -> float:
-        """Turn (rad) of the determinant from the end of the band to infinite frequency, where it is 1."""
+        """Change (rad) of the determinant's argument from the end of the band to infinite frequency, where it is 1."""
         angles = float(np.sum(self._angles()))
         return -angles - float(np.angle(last * np.exp(-1j * angles)))
 

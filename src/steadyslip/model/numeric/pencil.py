@@ -226,7 +226,7 @@ class StatePencil:
         return float(1 / (size * slope)) if slope else np.inf
 
     def resolvent(self, out: Array, into: Array) -> Callable[[ComplexArray], ComplexArray]:
-        """Function of places s (p,): `out`ᵀ (s E − A)⁻¹ `into`, (p, k, m), for `out` (N, k) and `into` (N, m)."""
+        """Function of s (p,) that returns `out`ᵀ (s E − A)⁻¹ `into`, (p, k, m), for `out` (N, k) and `into` (N, m)."""
         known = self._decomposed
         if known is not None:
             values, right, rows = known
@@ -342,7 +342,9 @@ def _flat(rows: Array) -> Array:
 def _add_contact(
     e: Array, a: Array, site: Site, slopes: Slopes, n: int, own: slice, integrates: bool
 ) -> NDArray[np.bool_]:
-    """Add the forces and memories of one contact to pencils; False (...) where its own equations are ill-posed.
+    """Add the forces and memory variables of one contact to pencils.
+
+    False (...) where the contact's equations are ill-posed.
 
     τ = s_v v + s_σ σ + s_τ τ + s_m m and σ = n_x x + ... + n_τ τ are solved for both stresses first.
     """
@@ -393,7 +395,7 @@ def _add_contact(
 
 
 def growing_roots(e: Array, a: Array, size: int, posed: NDArray[np.bool_], sure: bool) -> NDArray[np.int64]:
-    """Number of growing eigenvalues of pencils (p, N, N), (p,); `ILL_POSED` or `UNDECIDED` as `StatePencil.growing`.
+    """Number of growing eigenvalues of pencils (p, N, N), (p,); or a code as in `StatePencil.growing`.
 
     Matrices are divided by E, all at once, where this loses no digits that matter for the signs of real parts; other
     pencils are treated one by one.

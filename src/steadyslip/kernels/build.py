@@ -137,7 +137,7 @@ def interpreting() -> bool:
 
 
 def interpreted(programs: Sequence[Program], layout: Layout) -> Code:
-    """Code with programs as Python functions: slow, for tests and debuggers."""
+    """Routines of programs as Python functions, which are slow: for tests and debuggers."""
     functions = {program.name: python.function(program, interpreting()) for program in programs}
     return Code(layout, Routines(**{name: functions.get(name, _missing_routine) for name in Routines._fields}), True)
 
@@ -147,14 +147,14 @@ def _missing_routine(record: Any, number: float, array: Any) -> None:
 
 
 def compiled(programs: Sequence[Program], layout: Layout) -> Code:
-    """Code with programs as machine code, compiled now or read from the cache."""
+    """Routines of programs as machine code, compiled now or read from the cache."""
     addresses = machine_code(programs, layout.lanes)
     found = {name: addresses.get(name, 0) for name in Routines._fields}
     return Code(layout, Routines(**cast(Any, found)), False)
 
 
 def code_of(programs: Sequence[Program], layout: Layout, plain: bool) -> Code:
-    """Code with programs as Python functions if `plain`, else as machine code."""
+    """Routines of programs as Python functions if `plain`, else as machine code."""
     return (interpreted if plain else compiled)(programs, layout)
 
 

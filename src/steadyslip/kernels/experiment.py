@@ -186,7 +186,10 @@ class ExperimentProgram:
 
     @property
     def _measured_stress(self) -> sp.Expr:
-        """Normal stress (Pa) by which records divide friction; with pores the applied stress, before it has drained."""
+        """Normal stress (Pa) by which friction in records is divided.
+
+        With pore fluid the applied stress, before drainage.
+        """
         contact, channels = self.reduction.model.contact, self.reduction.channels
         if contact.outside is None:
             return self.reduction.outputs["sigma"]

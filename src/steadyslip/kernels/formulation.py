@@ -111,7 +111,10 @@ class Formulation:
         return self.constants.with_constants(expression)
 
     def _rates_with_constants(self) -> dict[int, sp.Expr]:
-        """Terms that changing constants add to the rates of sensitivities, by index in the state; also adds them."""
+        """Terms that changing constants add to the rates of sensitivities, by index in the state.
+
+        They are also added to the rates.
+        """
         reduction = self.reduction
         found = {
             reduction.state.index(symbol): self._change(self._rates[i], direction)
@@ -205,7 +208,8 @@ class Formulation:
         return len(self.reduction.slidings)
 
     def _shares(self, index: int) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-        """Ratios of a contact in steady sliding: slip rate to the drive's, slip rate and σ to the first contact's."""
+        """Ratios for a contact in steady sliding: slip rate over the drive's, slip rate and σ over the first
+        contact's."""
         one, first = self.reduction.slidings[index], self.reduction.slidings[0]
         stresses = [contact.sigma_ss for contact in self.reduction.model.contacts]
         return one.ratio, one.ratio / first.ratio, stresses[index] / stresses[0]
@@ -297,7 +301,7 @@ def _innermost(expressions: Iterable[sp.Expr], late: frozenset[sp.Symbol]) -> sp
 
 
 class _Collector:
-    """Rewriting of expressions as A s + B for one symbol s."""
+    """Rewriter of expressions in the form A s + B for one symbol s."""
 
     def __init__(self, symbol: sp.Symbol) -> None:
         self.symbol = symbol

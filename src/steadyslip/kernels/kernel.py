@@ -147,7 +147,7 @@ class Kernel(Formulation):
         return program
 
     def _shift_program(self) -> Program:
-        """Program of a jump of the load point: variables change by their shares of it.
+        """Program of a jump of the load point: each variable changes by its share of the jump.
 
         Before that, the force of a drive that is released or attached is updated (`_let_go`).
         """

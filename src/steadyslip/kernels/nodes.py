@@ -93,7 +93,7 @@ def as_node(value: Any, kind: str = "real") -> Node:
 
 
 def select(condition: Any, value: Any, other: Any) -> Any:
-    """`value` where the condition is true, else `other`."""
+    """`value` if the condition is true, else `other`."""
     if not isinstance(condition, Node):
         return value if condition else other
     return Node("select", (condition, as_node(value), as_node(other)))
@@ -200,5 +200,5 @@ class Program:
         self.stores.append((array, int(place), as_node(value)))
 
     def nodes(self) -> list[Node]:
-        """Nodes that the stores need, in order of computation."""
+        """Nodes on which the stored values depend, in order of computation."""
         return reachable([node for _, _, node in self.stores])

@@ -99,7 +99,7 @@ class Evaluator:
         return formulas(given | self.kernel.named(self.z))
 
     def store_unknowns(self) -> None:
-        """Store the unknowns as guesses for the next evaluation."""
+        """Append instructions that store the unknowns as guesses for the next evaluation."""
         for k, z in enumerate(self.z):
             self.program.store(guess_at(self.kernel.layout, k), z)
 
@@ -165,7 +165,7 @@ class Evaluator:
         return [horner(self.polynomial(i), theta) for i in range(self.kernel.size)]
 
     def store_polynomials(self) -> None:
-        """Store the polynomials of the dense output of the last step."""
+        """Append instructions that store the polynomials of the last step's dense output."""
         for i in range(self.kernel.size):
             for j, coefficient in enumerate(self.polynomial(i)):
                 self.program.store(self.kernel.layout.polynomial + i * self.kernel.terms + j, coefficient)

@@ -49,7 +49,7 @@ class Step(Evaluator):
         self.steady = None if kernel.timed else self.inputs(self.tau)
 
     def advance(self) -> None:
-        """Write the step itself, its error, and the size of the next step."""
+        """Append the instructions of the step itself, of its error, and of the size of the next step."""
         method = self.kernel.method
         errors = self._rosenbrock() if method.implicit else self._runge_kutta()
         error = self._squared(errors)
@@ -174,7 +174,7 @@ class Step(Evaluator):
         ]
 
     def keep(self) -> None:
-        """Write the stores of an accepted or rejected step, and the flag that calls the driver."""
+        """Append instructions that store an accepted or rejected step, and the flag that calls the driver."""
         load, store, good = self.program.load, self.program.store, self.good
         if self.kernel.choice.dense:
             self.store_stages()
@@ -226,7 +226,10 @@ class Step(Evaluator):
         return as_node(changed, "bool") & self.good
 
     def _events(self) -> Node:
-        """Write the sign changes of event functions; returns their number, zero in lanes that do not watch events."""
+        """Append instructions for sign changes of event functions.
+
+        Returns their number, zero in lanes that do not watch events.
+        """
         load, store, layout = self.program.load, self.program.store, self.kernel.layout
         here = self.here | {f"y{i}": value for i, value in enumerate(self.new)}
         moments = [self._with_errors(one) for one in self.moments(here, self.outputs, self.h, self.settled)]
@@ -273,7 +276,7 @@ class Step(Evaluator):
         return replace(moment, error=self.rtol * size, rounding=rounding)
 
     def store_state(self) -> None:
-        """Write the stores of the new state and its rates if the step is accepted, else of the old state and rates."""
+        """Append instructions that store the new state and its rates if the step is accepted, else the old ones."""
         layout, store, good = self.kernel.layout, self.program.store, self.good
         for i in range(self.kernel.size):
             store(layout.state + i, select(good, self.new[i], self.old[i]))
@@ -288,7 +291,7 @@ class Step(Evaluator):
             store(place, select(good, z, self.program.load(place)))
 
     def store_stages(self) -> None:
-        """Write the stores of the old state, stages and unknowns for dense output."""
+        """Append instructions that store the old state, the stages and the unknowns, for dense output."""
         layout, n, store = self.kernel.layout, self.kernel.size, self.program.store
         for i in range(n):
             store(layout.state_old + i, self.old[i])

@@ -54,7 +54,8 @@ class Watch(Evaluator):
         return self.program
 
     def _locate(self) -> None:
-        """Write the root: the fraction of the step at which velocity has an extreme, or slip begins or ends."""
+        """Append instructions that find the root: the fraction of the step at which velocity has an extreme, or slip
+        begins or ends."""
         kernel, program, w = self.kernel, self.program, self.kernel.layout.w
         own, smooth_polynomial = self.polynomial(w), self.smooth_polynomial(w)
         limit = program.load(Row.W_LIMIT)
@@ -85,13 +86,13 @@ class Watch(Evaluator):
         self.place = self.there[kernel.layout.x] + program.load(Row.LOAD_MOVED) + self.load_advance(self.tau)
 
     def _kept(self, row: int, condition: Node, value: Value) -> Node:
-        """Write a store of a value to a row where a condition is true; returns the row's new value."""
+        """Append an instruction that stores a value in a row where a condition is true; returns the row's new value."""
         new: Node = select(condition, value, self.program.load(row))
         self.program.store(row, new)
         return new
 
     def _turn(self) -> None:
-        """Write the update of the statistics of peaks and troughs of velocity."""
+        """Append instructions that update the statistics of peaks and troughs of velocity."""
         load = self.program.load
         peak = self.here & self.peak
         self._kept(Row.PEAK_VELOCITY, peak, larger(load(Row.PEAK_VELOCITY), self.v))
@@ -114,7 +115,7 @@ class Watch(Evaluator):
         return found
 
     def _slip(self) -> None:
-        """Write the update of slip in progress: its begin, whether it is fast at a peak, and its end if it was slow."""
+        """Append instructions that update the slip in progress: begin, whether fast at a peak, end if slow."""
         load, here = self.program.load, self.here
         anew = self.trough & (self.now_event <= 0.0) & (as_node(self.v) < self.now_from)
         anew = here & (self.begins | (anew & (self.now_from < float("inf"))))

@@ -114,7 +114,7 @@ def save_before_jump(R: Array, layout: Layout) -> None:
 
 
 def events_of_jump(R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array) -> None:
-    """Record the events caused by a jump: begin and end of slip, and of slip events."""
+    """Record the events that a jump causes: begin and end of slip and of slip events."""
     state_now(R, layout, routines, 0.0, y)
     for c in range(layout.contacts):
         own, each, v = tally_at(layout, c), events_per_contact(layout), y[outputs_at(layout, c) + Out.V]

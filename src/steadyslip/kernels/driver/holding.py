@@ -76,7 +76,10 @@ def wanted_force(Y: Array, control: Array, loops: Array) -> float:
 
 
 def sample_if_due(Y: Array, clock: Array, control: Array, loops: Array, late: Array) -> None:
-    """Take a sample, and apply a delayed force, if due. A row of `late` is time of action (s), force."""
+    """Take a sample, and apply a delayed force, if one of these is due.
+
+    A row of `late` is the time of action (s) and the force.
+    """
     held, now = 2 * (loops.shape[1] - 3) + 3, clock[Held.TIME]
     was = Y[held]
     if now >= control[Control.COUNT] * control[Control.PERIOD]:

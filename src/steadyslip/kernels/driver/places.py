@@ -50,7 +50,7 @@ def events_per_contact(layout: Layout) -> int:
 
 
 def tally_at(layout: Layout, contact: int) -> int:
-    """Offset to add to a `Row` from EVENTS to SMALL_DROP to get the row of a contact."""
+    """Offset that converts a `Row` from EVENTS to SMALL_DROP to the row of a contact."""
     return layout.further_statistics + (contact - 1) * TALLIED - Row.EVENTS if contact > 0 else 0
 
 

@@ -184,7 +184,7 @@ def record_event(R: Array, layout: Layout, number: int, tau: float, y: Array, lo
 
 
 def record_peak(R: Array, layout: Layout, contact: int, time: float, y: Array) -> None:
-    """Update the statistics of velocity peaks of a contact by a peak at a time (s)."""
+    """Update the statistics of a contact's velocity peaks by a peak at the given time (s)."""
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     v, v_lp = y[n + Out.V], y[n + Out.V_LP]
     size = math.log(abs(v / v_lp)) if v_lp != 0.0 else math.inf

@@ -97,7 +97,10 @@ def _array(body: Lines, place: int, kind: str, count: int, is_constant: bool) ->
 
 
 def new_array(body: Lines, sizes: Sequence[str], slot: str) -> ArrayView:
-    """Write the allocation of an array of zeros, whose address is stored in `slot`; returns a view of it."""
+    """Append instructions that allocate an array of zeros and store its address in `slot`.
+
+    Returns a view of the array.
+    """
     total = sizes[0]
     for size in sizes[1:]:
         total = body.name(f"mul nsw i64 {total}, {size}")
@@ -108,7 +111,7 @@ def new_array(body: Lines, sizes: Sequence[str], slot: str) -> ArrayView:
 
 
 def free_array(body: Lines, slot: str) -> None:
-    """Write the release of an array that `new_array` has allocated."""
+    """Append instructions that free an array which `new_array` has allocated."""
     pointer = body.pointer("real")
     found = body.name(f"load {pointer}, {body.pointer(pointer)} {slot}")
     body.add(f"call void @{MEMORY[1]}({pointer} {found})")

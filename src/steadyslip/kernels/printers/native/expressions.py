@@ -32,7 +32,7 @@ class Others(Protocol):
 
 @dataclass(frozen=True)
 class _Variable:
-    """Variable: its type, and a stack slot for each part of it."""
+    """Type of a variable, and a stack slot for each part of its value."""
 
     type: Type
     slots: tuple[str, ...]
@@ -119,7 +119,7 @@ class Expressions:
         return found
 
     def _branches(self, test: ast.expr, yes: Callable[[], None], no: Callable[[], None]) -> None:
-        """Write an if statement; `yes` and `no` are functions that write its branches."""
+        """Append an if statement; `yes` and `no` are functions that append its branches."""
         lines = self.lines
         then, other, done = lines.label("then"), lines.label("else"), lines.label("done")
         lines.fork(self._truth(test), then, other)
@@ -243,7 +243,7 @@ class Expressions:
         return Scalar("bool", found)
 
     def _connected(self, all_of_them: bool, values: Sequence[ast.expr]) -> Scalar:
-        """Result of ``and`` or ``or``, whose later operands are evaluated only if needed."""
+        """Result of ``and`` or ``or``; later operands are evaluated only if needed."""
         lines = self.lines
         slot, done = lines.slot("bool"), lines.label("done")
         for i, one in enumerate(values):
@@ -258,7 +258,7 @@ class Expressions:
         return lines.get("bool", slot)
 
     def _either(self, test: ast.expr, yes: ast.expr, no: ast.expr) -> Operand:
-        """Conditional expression; only the chosen value is evaluated."""
+        """Result of a conditional expression; only the chosen value is evaluated."""
         self.choices += 1
         name = f"either {self.choices}"  # has a space, so that it differs from all Python names
         mixed = {"real", "int"} == {self._type(yes), self._type(no)}
@@ -315,7 +315,7 @@ class Expressions:
         return arrays.new_array(self.lines, sizes, self.arrays_made[-1])
 
     def _function(self, node: ast.expr, name: str, given: Sequence[ast.expr]) -> Operand:
-        """Result of a call of another compiled function; arguments are converted to the types that it annotates."""
+        """Result of a call of another compiled function; arguments are converted to the types in its annotations."""
         heads = self.others.functions[name][0].args.args
         if len(heads) != len(given):
             raise self.refuse(node, f"a call of {name} with {len(given)} arguments")
@@ -328,7 +328,7 @@ class Expressions:
         return self.lines.call(symbol, result, values)
 
     def _routine(self, given: Sequence[ast.expr]) -> Scalar:
-        """Write a call of a model's routine by its address; it has no result."""
+        """Append a call of a model's routine by its address; the call has no result."""
         lines, array = self.lines, self.lines.pointer("real")
         record, changed = self._array_of(given[1]), self._array_of(given[3])
         number = self._as(given[2], self._value(given[2]), "real")

@@ -22,7 +22,7 @@ def translated(
     modules: Mapping[str, str], entries: Mapping[str, Sequence[str]], symbols: Mapping[str, str], constant: int,
     opaque: bool,
 ) -> str:  # fmt: skip
-    """Assembly of functions of some modules that are called from Python, and of all functions that they call.
+    """Assembly of the functions of some modules that Python calls, and of all functions that these call.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ class _Function(Expressions):
         self.loops.pop()
 
     def _loop(self, node: ast.For, name: str, over: ast.expr, body: Sequence[ast.stmt]) -> None:
-        """Write a loop over a range; for a loop over a tuple of values the body is written once for each value."""
+        """Append a loop over a range; for a loop over a tuple of values, the body is appended once for each value."""
         lines = self.lines
         if isinstance(over, ast.Tuple):
             done = lines.label("done")
@@ -220,7 +220,7 @@ class _Function(Expressions):
         lines.begin(done)
 
     def _assigned(self, targets: Sequence[ast.expr], value: ast.expr) -> None:
-        """Write an assignment; all values of a tuple are computed before the first is stored."""
+        """Append an assignment; all values of a tuple are computed before the first is stored."""
         match targets:
             case [ast.Tuple(elts=parts)]:
                 found = self._value(value)

@@ -14,7 +14,7 @@ MEMORY = ("PyMem_RawCalloc", "PyMem_RawFree")
 
 @dataclass(frozen=True)
 class Scalar:
-    """Scalar value: its kind (``real``, ``int``, ``bool``; ``none`` for no value) and its text in the assembly."""
+    """A scalar value: its kind (``real``, ``int``, ``bool``; ``none`` for no value) and its text in the assembly."""
 
     kind: str
     text: str
@@ -26,7 +26,7 @@ class Scalar:
 
 @dataclass(frozen=True)
 class ArrayView:
-    """Array: kind of its elements, pointer to the first, size along each index, True if elements never change."""
+    """An array: kind of its elements, pointer to the first, size along each index, True if elements never change."""
 
     kind: str
     pointer: str

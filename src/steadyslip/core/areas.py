@@ -31,7 +31,9 @@ def total_unit(unit_name: str) -> str:
 
 
 def outside(unit_name: str, area: float | None) -> tuple[float, str]:
-    """Factor and unit that make a stored per-area value the total of an area (m²); 1 and the unit itself without area.
+    """Factor and unit that convert a stored per-area value to the total of an area (m²).
+
+    1 and the unit itself without area.
 
     Readers and tables pass the rig's area; text and figures pass the area that `display_area` returns.
 
@@ -92,7 +94,7 @@ def total(value: float | None, unit_name: str, area: float | None) -> dict[str, 
 
 
 def _times(value: float | None, factor: float) -> float | None:
-    """Product for JSON; None if the value is missing or the product is not finite."""
+    """Product of value and factor for JSON; None if the value is missing or the product is not finite."""
     return value * factor if value is not None and math.isfinite(value * factor) else None
 
 

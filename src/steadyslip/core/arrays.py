@@ -67,7 +67,7 @@ def _numbers(value: Any) -> np.ndarray:
 
 
 def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> None:
-    """Check arrays in place of a record's numbers against its conditions between several parameters.
+    """Check arrays that replace numbers of a record against the record's conditions between several parameters.
 
     Raises
     ------

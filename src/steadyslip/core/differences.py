@@ -53,7 +53,9 @@ def differing(first: FrozenRecord, second: FrozenRecord, prefix: str = "") -> It
 
 
 def mixed(first: R, second: R, taken: Collection[str], prefix: str = "") -> R:
-    """Copy of the first record with the second's values of the dotted names `taken`; checked by the constructors.
+    """Copy of the first record that has the second record's values of the dotted names `taken`.
+
+    Checked by the constructors.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from steadyslip.core.roles import Entry, Schema, fault
 
 @dataclass(frozen=True)
 class Option(Entry):
-    """Field type: one of several listed words or numbers, or a bool."""
+    """Field type whose value is one of several listed words or numbers, or a bool."""
 
     choices: tuple[Any, ...]
     doc: str
@@ -42,7 +42,7 @@ class Option(Entry):
 
 @dataclass(frozen=True)
 class Text(Entry):
-    """Field type: non-empty text."""
+    """Field type whose value is a non-empty text."""
 
     doc: str
 
@@ -60,7 +60,7 @@ class Text(Entry):
 
 @dataclass(frozen=True)
 class Label(Entry):
-    """Field type: a name, or an integer from 1."""
+    """Field type whose value is a name, or an integer from 1."""
 
     doc: str
 
@@ -81,7 +81,7 @@ class Label(Entry):
 
 @dataclass(frozen=True)
 class Names(Entry):
-    """Field type: one name or a list of names, kept as a tuple."""
+    """Field type whose value is a name or a list of names; it is stored as a tuple."""
 
     doc: str
 
@@ -102,7 +102,7 @@ class Names(Entry):
 
 @dataclass(frozen=True)
 class LabelledNumbers(Entry):
-    """Field type: several dimensionless finite numbers, as a tuple or as a dict by labels."""
+    """Field type whose value is a list of finite dimensionless numbers, or a dict of such numbers by label."""
 
     doc: str
 
@@ -131,7 +131,10 @@ class LabelledNumbers(Entry):
 
 @dataclass(frozen=True)
 class Headings(Entry):
-    """Field type: dict of names to columns of a data file, each a heading, a number from 1, or a pair with the unit."""
+    """Field type whose value is a dict that assigns names to columns of a data file.
+
+    A column is given by its heading, by its number from 1, or by a pair of either with the unit.
+    """
 
     doc: str
 
@@ -162,7 +165,7 @@ class Headings(Entry):
 
 @dataclass(frozen=True)
 class Whole(Entry):
-    """Field type: an integer between two bounds, both included."""
+    """Field type whose value is an integer between two bounds, both included."""
 
     doc: str
     low: int
@@ -188,7 +191,7 @@ class Whole(Entry):
 
 @dataclass(frozen=True)
 class Span(Entry):
-    """Field type: interval as a pair of SI numbers or texts with units, start and end."""
+    """Field type whose value is an interval: a pair of start and end, SI numbers or texts with units."""
 
     doc: str
     unit: str
@@ -215,7 +218,7 @@ class Span(Entry):
 
 @dataclass(frozen=True)
 class Quantity(Entry):
-    """Field type: an SI number, or text with a unit; another entry of the file sets its dimension."""
+    """Field type whose value is an SI number or a text with a unit; another entry of the file sets its dimension."""
 
     doc: str
 

@@ -235,7 +235,7 @@ def format_as_written(value: float, own: float, si_unit: str, digits: int = 4, a
 
 
 def format_own(value: float, si_unit: str, area: float | None = None) -> str:
-    """Text of a parameter's present SI value in the unit of the file, with four digits, or six if four round it.
+    """Text of a parameter's present SI value in the unit of the file, with four digits, or six if four would round it.
 
     >>> format_own(2e5, "1/m"), format_own(316.228, "s/m")
     ('2e+05 1/m', '316.228 s/m')

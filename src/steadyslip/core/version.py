@@ -53,5 +53,5 @@ def stamped(answer: Any) -> Any:
 
 
 def of_another(made: str) -> str:
-    """Note that a result was computed by the version `made`; empty if that is this version."""
+    """Note that a result was computed by the version `made`; empty if `made` is this version."""
     return "" if made == (own := version()) else f"computed by steadyslip {made}, this is {own}"

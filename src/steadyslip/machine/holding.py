@@ -56,7 +56,10 @@ def encoder(unit: str) -> Any:
 
 
 class Holding(FrozenRecord):
-    """Base of controllers, which hold a place at velocity 0; with `sample_time` derivatives are differences."""
+    """Base of controllers, which hold a place at velocity 0.
+
+    With `sample_time`, derivatives are differences of samples.
+    """
 
     velocity: float = parameter("m/s", speed, "velocity v0 in steady sliding; 0 to hold a place", letter="v_0")
     derivative: str = option(

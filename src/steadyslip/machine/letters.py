@@ -84,7 +84,7 @@ def words_of(rig: Rig, name: str) -> str:
 
 
 def label_of(rig: Rig, name: str) -> str:
-    """Words and letter of a parameter as plain text; preceded by the part of the rig if another has the same text.
+    """Words and letter of a parameter as plain text, after the part of the rig if another parameter has the same text.
 
     Dotted names that are no parameters, such as the choice of a law, become words. Names joined by + are converted one
     by one and joined by "and".

@@ -275,7 +275,7 @@ class Machine(Rig):
             yield floating_body(name)
 
     def conditions(self) -> Iterator[Condition]:
-        """Yield the conditions that loops of links give one speed, and that all contacts slide forwards."""
+        """Yield the conditions that links of a loop agree on speeds, and that all contacts slide forwards."""
         speeds, closing = self._speeds()
         for tie, speed, other in closing:
             message = f"the links contradict each other: {tie.second} would move at {{}} and also at {{}} m/s or rad/s"

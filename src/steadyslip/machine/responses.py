@@ -133,5 +133,5 @@ class ResponseData(Displayed):
 
 
 def _is_round(step: float) -> bool:
-    """True for a number of up to four digits, or one whose reciprocal is."""
+    """True for a number that has at most four digits, or whose reciprocal has at most four digits."""
     return any(abs(float(f"{one:.4g}") - one) < _ROUND * one for one in (step, 1 / step))

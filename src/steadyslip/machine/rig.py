@@ -216,14 +216,14 @@ class Rig(FrozenRecord, HasCache):
         return value, self.parameters()[name].role.unit
 
     def feed(self) -> tuple[float, bool]:
-        """Ratio of the motion that users give to the drive's, and True if it is a rotation.
+        """Ratio of the motion that users give to the motion of the drive, and True if the motion given is a rotation.
 
         Users give the motion of the body in `velocity_of`, or else that of the drive.
         """
         return 1.0, bool(self.drive.turns)
 
     def seen(self) -> tuple[float, bool]:
-        """Ratio of the measured body's motion to the drive's, and True if the measured body turns."""
+        """Ratio of the measured body's motion to the motion of the drive, and True if the measured body turns."""
         return 1.0, bool(self.drive.turns)
 
     def gain_name(self) -> str | None:

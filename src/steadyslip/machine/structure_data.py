@@ -201,7 +201,8 @@ class StructureData(Displayed):
 
     @cached_property
     def modal_damping(self) -> Array:
-        """Damping matrix (n, n) that gives each mode of inertia and symmetric stiffness a damping ratio of 1, N s/m."""
+        """Damping matrix (n, n), N s/m, with which each mode of inertia and symmetric stiffness has a damping ratio
+        of 1."""
         squares, shapes = self._own_modes
         carried = self.mass @ shapes
         found: Array = (carried * (2 * np.sqrt(np.maximum(squares, 0.0)))) @ carried.T
@@ -212,7 +213,7 @@ class StructureData(Displayed):
 
     @cached_property
     def _own_modes(self) -> tuple[Array, Array]:
-        """Squared angular frequencies (n,), rising, rad²/s², and shapes (n, n) by mass and symmetric stiffness."""
+        """Squared frequencies (n,), rad²/s², rising, and mode shapes (n, n), from mass and symmetric stiffness."""
         from scipy.linalg import eigh  # slow to import
 
         squares, shapes = eigh(0.5 * (self.stiffness + self.stiffness.T), self.mass)

@@ -73,7 +73,8 @@ class OfStructure(Entry):
 
 @dataclass(frozen=True)
 class FileUnits(Entry):
-    """Field type: units of length, mass or force, and time of a finite-element file, which does not state them."""
+    """Field type whose value names the units of length, mass or force, and time of a finite-element file, which does
+    not state them."""
 
     doc: str
 
@@ -116,7 +117,7 @@ def unit_sizes(units: Any) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class Freedom(Entry):
-    """Field type: a degree of freedom of matrices, given by its number from 1 or by its name."""
+    """Field type whose value is a degree of freedom of matrices, given by its number from 1 or by its name."""
 
     doc: str
 

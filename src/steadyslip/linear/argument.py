@@ -107,7 +107,7 @@ class SumsOnAxis:
     def resolved_pieces(self) -> Iterator[tuple[_Pieces, NDArray[np.int64]]]:
         """Yield pieces with a known change of argument, with the index of the dominant term (−1 if no term dominates).
 
-        For a rig that needs more pieces than are allowed, the unresolved ones have `UNKNOWN` instead of the index.
+        For a rig that needs more pieces than are allowed, unresolved pieces have `UNKNOWN` instead of the index.
         """
         pieces = self.whole()
         while pieces.row.size:

@@ -136,12 +136,12 @@ def judged(c: Polynomial, choose: Choose, spare: Any, most: int) -> tuple[Any, l
 
     Wherever the result changes, one of the functions changes sign.
 
-    `spare` of the highest coefficients may be 0; `spare` is at most `most`.
+    The `spare` highest coefficients may be 0; `most` is an upper limit of `spare`.
 
     The three functions are the lowest coefficient (zero: a root is zero), the highest (zero: a root is infinite), and
-    the last but one Hurwitz determinant (zero: two roots are ±iβ), by Orlando proportional to the product of all sums
-    of two roots. The determinant has several factors, entries of the Routh array. Where highest coefficients are 0, the
-    next one takes their place.
+    the last but one Hurwitz determinant (zero: two roots are ±iβ). By Orlando this determinant is proportional to the
+    product of all sums of two roots; its factors are entries of the Routh array. If highest coefficients are 0, the
+    next coefficient takes their place.
     """
     largest: Any = 0.0
     for one in c:

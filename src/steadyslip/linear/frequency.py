@@ -55,7 +55,8 @@ def resonances(rig: Slider | Machine, input: str, output: str, shortest: float, 
 
     Rows (r, 3) are period (s), gain and phase (degrees).
 
-    Searched on a fine grid and near the period of every mode, so that lightly damped ones are found.
+    The search covers a fine grid and the neighbourhood of every mode's period, so that no lightly damped mode is
+    missed.
     """
     from scipy.optimize import minimize_scalar  # slow to import
     from scipy.signal import find_peaks

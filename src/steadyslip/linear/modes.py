@@ -209,8 +209,8 @@ def _number(s: complex, eigenvalues: ComplexArray) -> int:
 def _null_vector(matrix: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Null vector of a singular matrix; rows and columns of very different size are balanced first.
 
-    Balancing uses `sizes`, sums of absolute values of the terms of each entry, so that rounding error of a row whose
-    terms cancel at the eigenvalue is not amplified.
+    Balancing uses `sizes`, which are sums of the absolute values of the terms of each entry. If the terms of a row
+    cancel at the eigenvalue, the rounding error of the row is then not amplified.
     """
     columns = np.ones(len(matrix))
     for _ in range(3):

@@ -47,10 +47,10 @@ def leads(c: Array) -> NDArray[np.bool_]:
 def least_size(c: Array, sets: Sets) -> Array:
     """Lower bound (rows,) of |P| for all |x_i| <= 1, with coefficients c (rows, m) of P; not positive if P may vanish.
 
-    It is exact for two terms. If delayed terms exceed the undelayed one and some are products, |P| is minimised in one
-    x_i after the other, from many starts: P is linear in each, P = A + B x_i, so that it vanishes if |B| >= |A|
-    anywhere, and is else smallest on |x_i| = 1. For two delays a zero is found with certainty: |A|² − |B|² is linear in
-    the cosine of the other phase, so that its signs at ±1 decide.
+    The bound is exact for two terms. If the delayed terms exceed the undelayed term and some are products, |P| is
+    minimised in one x_i after the other, from many starts: P = A + B x_i is linear in every x_i, so that it vanishes if
+    |B| >= |A| anywhere, and otherwise is smallest on |x_i| = 1. For two delays a zero is found with certainty: |A|² −
+    |B|² is linear in the cosine of the other phase, so that its signs at ±1 decide.
     """
     found = np.asarray(np.abs(c[:, 0]) - np.sum(np.abs(c[:, 1:]), axis=-1))
     several = np.any(c[:, np.sum(sets, axis=1) > 1] != 0, axis=-1)

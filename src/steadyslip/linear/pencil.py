@@ -129,7 +129,7 @@ def _checked(
 ) -> CheckedSpectrum:
     """Make the CheckedSpectrum: it is complete if as many eigenvalues grow as an independent method counts.
 
-    Under delays that method is the argument principle; without delays the determinant shows that none is missing.
+    With delays that method is the argument principle; without delays the determinant shows if an eigenvalue is missing.
     """
     surely, perhaps = (int(np.sum(values.real > edge * errors)) for edge in (1, -1))
     if point.model.delays:

@@ -73,7 +73,7 @@ def rightmost(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
 def _by_ratios(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
     """First `count` roots, (rows, count); NaN where a count of all roots shows that some are missing.
 
-    For rigs whose highest power is not delayed; coefficients (rows, m, n+1).
+    Only for rigs whose highest power of s is not delayed; coefficients are (rows, m, n+1). Other rigs get NaN.
     """
     found = np.full((len(c), count), np.nan + 0j, dtype=complex)
     longest = np.max(h, axis=-1)
@@ -180,7 +180,7 @@ def _left_end(c: Array, h: Array, sets: Sets) -> tuple[float, float, int]:
     """Result of `_line_of_many`, a real part right of it up to which roots are sought, and the number of roots further
     right.
 
-    (−inf, −inf, `INFINITE`) if no highest derivative is delayed.
+    The result is (−inf, −inf, `INFINITE`) if no highest derivative is delayed.
     """
     line = _line_of_many(c, h, sets)
     if not np.isfinite(line):
@@ -199,8 +199,8 @@ def _left_end(c: Array, h: Array, sets: Sets) -> tuple[float, float, int]:
 def _line_of_many(c: Array, h: Array, sets: Sets) -> float:
     """Real part right of which a rig has finitely many roots, for coefficients c (m, n+1) and delays h (m,).
 
-    Left of it the highest power of s can vanish: infinitely many roots come arbitrarily close to it, for the given
-    delays or delays arbitrarily near them. −inf if no highest derivative is delayed.
+    Left of this line the highest power of s can vanish: infinitely many roots come arbitrarily close to the line, for
+    the given delays or delays arbitrarily near them. −inf if no highest derivative is delayed.
     """
     top = highest(c[None])[0]
     if not np.any(top[:, 1:] * h[1:]):

@@ -29,7 +29,7 @@ _ROUNDING = 16 * np.finfo(float).eps  # discriminant over (half sum)² below whi
 def quietly(function: Callable[P, R]) -> Callable[P, R]:
     """Decorate a function so that overflow gives inf or NaN without a NumPy warning.
 
-    Every call makes its own `numpy.errstate`: before NumPy 2, a single instance leaves the error state changed if
+    Every call makes a new `numpy.errstate`: before NumPy 2, a shared instance leaves the error state changed if
     decorated functions call each other or run in several threads.
     """
 
@@ -138,8 +138,8 @@ def _are_missed(c: Array, s: ComplexArray) -> NDArray[np.bool_]:
 def _roots_by_size(c: Array) -> ComplexArray:
     """Roots (rows, n) of polynomials of full degree that have roots of very different size.
 
-    Each group of roots of similar size is computed with time in units in which they are about one, as the effect of the
-    other roots on the coefficients is then negligible. Polynomials with equal groups are solved together.
+    Each group of roots of similar size is computed with a unit of time in which these roots are about one: the effect
+    of the other roots on the coefficients is then negligible. Polynomials with equal groups are solved together.
     """
     n = c.shape[-1] - 1
     mantissa, exponent = np.frexp(c)

@@ -116,7 +116,8 @@ def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
 def among_many(point: OperatingPoint, found: ComplexArray) -> NDArray[np.bool_]:
     """True (...) where eigenvalues in `found` (..., n) are NaN because infinitely many lie close together.
 
-    That happens with a delayed highest derivative (a body without mass under a late controller). False if ill-posed.
+    This happens if a highest derivative is delayed (a body without mass under a controller with dead time). False for
+    ill-posed rigs.
     """
     if not point.model.delays:
         return np.zeros(point.shape, dtype=bool)
@@ -179,7 +180,7 @@ def crossing_frequency(point: OperatingPoint) -> float:
 def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:
     """True where an oscillation neither grows nor decays: its real part is negligible (`_negligible`).
 
-    With delays only the leading oscillation is tested, by a phase of at most `share` (rad).
+    With delays only the leading oscillation is tested: the phase to its crossing is at most `share` (rad).
     """
     if not point.model.delays:
         s = spectrum(point)
@@ -194,7 +195,8 @@ def distance_from_axis(point: OperatingPoint) -> Array:
 
     NaN where no root is known.
 
-    With one delay the phase (rad) to the nearest crossing, which is at least as large; inf where other roots grow.
+    With one delay the result is the phase (rad) to the nearest crossing, which is at least as large, and inf where
+    other roots grow.
     """
     if len(point.model.delays) == 1:
         return np.where(counts(point) <= _ONE_CROSSING, np.nanmin(np.abs(nearness(point)), axis=0), np.inf)

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 def jacobian(rig: Slider | Machine) -> Array:
     """Jacobian (n, n) of the rates of the states at steady sliding, SI units of the Model's variables.
 
-    The algebraic unknowns are eliminated. Its eigenvalues give stability independently of the closed form and of the
-    characteristic polynomial.
+    The algebraic unknowns are eliminated. The eigenvalues of the Jacobian give stability independently of the closed
+    form and of the characteristic polynomial.
     """
     return state_matrices(rig, ()).a
 

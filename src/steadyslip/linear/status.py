@@ -160,8 +160,8 @@ def is_neutral(point: OperatingPoint) -> NDArray[np.bool_]:
 def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
     """True where a rig is on an edge to 9 digits: an oscillation is undamped, or the static stiffness is zero.
 
-    A block without any stiffness has static stiffness zero, too. Where another disturbance grows, sliding is unstable
-    and the rig is not on an edge.
+    The static stiffness is also zero for a block without any stiffness. If another disturbance grows, sliding is
+    unstable and the rig is not on an edge.
     """
     with np.errstate(all="ignore"):
         undamped = is_near_edge(point, ON_THE_EDGE)

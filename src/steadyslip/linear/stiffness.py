@@ -88,8 +88,8 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
 def own_safety_factor(point: OperatingPoint) -> Array:
     """Safety factor of sliders, (...): stiffness k + kp over its critical value, with the gain kp of a controller.
 
-    The critical value may be below kp, if the gain alone is more than enough; not with a delay, as a delayed gain is
-    not a stiffness.
+    The critical value may be below kp if the gain alone is more than enough. With a delay it may not, as a delayed gain
+    is not a stiffness.
     """
 
     def kernel(part: OperatingPoint) -> Array:
@@ -198,11 +198,11 @@ def _warn_of_delays(count: int, size: int) -> None:
 def growth_rate(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     """Largest real part of the eigenvalues (1/s): positive grows, negative decays.
 
-    inf where the problem is ill-posed (theory 3: a3 < 0, or a3 = 0 and a2 <= 0), NaN without steady sliding and where
-    numbers leave the range of floating point (see `stability`). Where a highest derivative is delayed (a body without
-    mass under a late controller, for example) there may be no slowest decay, only infinitely many rates with a limit.
-    The result is that limit, for the given delays or delays arbitrarily near them, and NaN if the limit is not known to
-    a thousandth.
+    The result is inf where the problem is ill-posed (theory 3: a3 < 0, or a3 = 0 and a2 <= 0), and NaN without steady
+    sliding or where numbers leave the range of floating point (see `stability`). Where a highest derivative is delayed
+    (a body without mass under a late controller, for example) there may be no slowest decay, only infinitely many rates
+    with a limit. The result is that limit, for the given delays or delays arbitrarily near them, and NaN if the limit
+    is not known to a thousandth.
 
     Examples
     --------
@@ -303,7 +303,7 @@ def _lost(product: Array) -> NDArray[np.bool_]:
 def interval_ingredients(model: Model) -> tuple[sp.Expr, ...]:
     """Expressions N, D, μB2, μB3, a2, a3 (arguments of `cubic.stable_interval`) and the gain of a controller.
 
-    They are in the model's parameters and σss. The interval is one of the total stiffness, gain included.
+    They are functions of the model's parameters and σss. The interval is that of the total stiffness, gain included.
     """
     part = response(model)
     known = part.as_dict()

@@ -14,7 +14,7 @@ from steadyslip.model.range import characteristic
 def is_undamped(point: OperatingPoint) -> NDArray[np.bool_]:
     """True (...) where the characteristic polynomial has only even powers of s, and not only s^0.
 
-    False for a slider, which has a single oscillation that cannot couple with another.
+    False for a slider: it has a single oscillation, which cannot couple with another one.
     """
     if point.model.is_single or point.model.delays or not is_written_out(point.model):
         return np.zeros(point.shape, dtype=bool)

@@ -54,7 +54,7 @@ def pade_error(order: int, turn: float) -> float:
 def _frequencies(model: Model) -> ArrayFunction:
     """Array function of upper bounds of the squared angular frequencies of bodies (rad/s)², followed by the delays (s).
 
-    Gershgorin's bound: the sum of all stiffnesses in the balance of a body, delayed ones included, over its inertia.
+    The bound is Gershgorin's: the sum of all stiffnesses in the balance of a body, delayed or not, over its inertia.
     """
     places = [one.displacement for one in model.coordinates]
     places += [late for late, (base, _) in model.late.items() if base in places]

@@ -75,7 +75,7 @@ def determinant(
 ) -> tuple[list[sp.Symbol], dict[Powers, Terms]]:
     """Determinant of a matrix of polynomials in symbols with integer coefficients, expanded.
 
-    Laplace expansion by rows; each minor of the rows below is computed once.
+    Laplace's expansion by rows is used, in which each minor of the last rows is computed only once.
 
     Returns
     -------

@@ -160,8 +160,8 @@ def _determinant(model: Model) -> Polynomial | None:
 def _loading_tensions(model: Model) -> tuple[sp.Symbol, ...]:
     """Forces of links (as stresses) on which the normal stress or the friction of a contact depends.
 
-    Such a force acts on a contact and on the bodies that the link joins. If it is an unknown of the determinant, terms
-    of contact and bodies that cancel for every stiffness of the link cancel exactly.
+    The force of such a link acts on a contact and on the bodies that the link joins. If the force is an unknown of the
+    determinant, terms of contact and bodies that cancel for every stiffness of the link cancel exactly.
     """
     springs = [contact.spring for contact in model.contacts if contact.spring in model.definitions]
     using = [e for symbol, e in model.definitions.items() if symbol not in springs]
@@ -242,7 +242,7 @@ def characteristic_rows(model: Model, kept: tuple[sp.Symbol, ...] = ()) -> dict[
 def stiffness_split(model: Model) -> tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]:
     """Split the characteristic polynomial into p(s) + k q(s); coefficients of p and q, lowest power first.
 
-    Exact, because the slider's stiffness k enters by a rank-one term.
+    The split is exact, because the slider's stiffness k enters by a term of rank one.
     """
     symbol = model.parameters["slider.stiffness"]
     coefficients = characteristic_coefficients(model)

@@ -220,8 +220,8 @@ def _rising(model: Model) -> tuple[ArrayFunction, int]:
 def _force_function(model: Model, index: int) -> ArrayFunction:
     """Array function of stresses (Pa) at a contact in steady sliding, by which rounding is judged.
 
-    In this order: change of the pull by dashpots per e-fold of v; changes of σ by pull and friction; pull; friction;
-    contributions of normal stress and memory to friction.
+    They are, in this order: change of the pull by dashpots per e-fold of v; changes of σ by pull and by friction; pull;
+    friction; contributions of normal stress and of memory variables to friction.
     """
     contact = model.contacts[index]
     inner = [contact.normal, *(item.symbol for item in contact.memory)]

@@ -149,7 +149,7 @@ class Kernel(Formulation):
     def _shift_program(self) -> Program:
         """Program of a jump of the load point: each variable changes by its share of the jump.
 
-        Before that, the force of a drive that is released or attached is updated (`_let_go`).
+        Before the jump, the force of a drive that is released or attached is updated (`_let_go`).
         """
         record = Evaluator(self, Program("shift"))
         program = record.program
@@ -165,7 +165,7 @@ class Kernel(Formulation):
     def _speed_up(self, record: Evaluator) -> None:
         """Update velocity variables, which are relative to the drive, so that bodies' velocities are continuous.
 
-        It concerns bodies that slide on the drive when the velocity of the drive jumps.
+        This is needed for bodies that slide on the drive, when the velocity of the drive jumps.
         """
         program, reduction = record.program, self.reduction
         values = record.constants | {f"k{i}": program.load(self.layout.continuous + i) for i in range(self.layout.kept)}

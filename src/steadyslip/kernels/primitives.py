@@ -68,7 +68,8 @@ def sqrt(x: Any) -> Any:
 def exp(x: Any) -> Any:
     """e^x to 2.5 units; 0 below -700, e^700 above 700. Degree-13 polynomial on [-ln2/2, ln2/2], Estrin's scheme.
 
-    Each step of a trajectory waits for it, so the chain of dependent operations from x to the result is short.
+    Each step of a trajectory waits for this function, so the chain of dependent operations from x to the result is
+    short.
     """
     x = _quick(x)
     shifted = x * 1.4426950408889634 + ROUND
@@ -118,7 +119,7 @@ def log(x: Any) -> Any:
 def rough_log(x: Any) -> Any:
     """ln x to within .03, for positive x: a float's bits, read as an integer, grow almost like its logarithm.
 
-    That is enough for step sizes, which depend on a small power of x.
+    This accuracy is enough for step sizes, which depend on a small power of x.
     """
     return as_float(bits(_quick(x)) - ONE) * 1.539095918623324e-16 + 0.02983  # ln 2 / 2^52; mean error
 

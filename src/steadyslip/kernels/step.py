@@ -163,9 +163,9 @@ class Step(Evaluator):
     def _settled(self, inverse: Value) -> list[Value]:
         """Rates at the end y1 of a Rosenbrock step, from the equation of its last stage u.
 
-        They are f(y1 − u) + J u = u/(hγ) − Σ c_j u_j/h. In f(y1) itself, the error of y1 is multiplied by the Jacobian,
-        which for a stiff system gives much more than the true rate, of either sign. In this equation the error cancels,
-        because the method has solved with the same Jacobian.
+        The rates are f(y1 − u) + J u = u/(hγ) − Σ c_j u_j/h. In f(y1) the error of y1 is multiplied by the Jacobian,
+        and for a stiff system the product exceeds the true rate by far. In the equation of the last stage this error
+        cancels, because the method has solved with the same Jacobian.
         """
         method, (*before, last) = self.kernel.method, self.stages
         return [

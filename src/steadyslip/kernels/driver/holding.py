@@ -146,7 +146,8 @@ def keep_values(values: Array, clock: Array, rows: Array, length: float) -> None
 def may_fail(coefficients: Array, first: int, count: int) -> bool:
     """True if a polynomial may have a value <= 0 on 0..1; its coefficients start at index `first`.
 
-    Between two nodes it is below their values by at most an eighth of the spacing squared times its second derivative.
+    Between two nodes the polynomial is below their values by at most its second derivative times an eighth of the
+    squared spacing.
     """
     rest, bend, least = 0.0, 0.0, math.inf
     for k in range(1, count):

@@ -112,7 +112,7 @@ def end_slip(R: Array, layout: Layout, contact: int, tau: float, y: Array, log: 
     A slip event has a stress drop of at least EVENT_SHARE of the largest drop so far. It continues the last event (in
     the same direction) if the stress rose by less than that share in between. If all earlier drops are smaller than
     EVENT_SHARE of its drop, they were ringing too, and the count begins anew. Slip with a smaller drop is an event if
-    `goes_on_after_knock`.
+    `goes_on_after_knock` is true.
     """
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     sign, fast = R[own + Row.NOW_SIGN], R[own + Row.NOW_EVENT]

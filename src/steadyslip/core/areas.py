@@ -48,7 +48,8 @@ def display_area(unit_name: str, area: float | None) -> float | None:
 
     Stresses are displayed if the display units (`steadyslip.core.written`) contain the per-area unit and not the unit
     of the total, such as MPa and no N. If they contain neither, the file's other quantities decide. If they contain no
-    unit of area, the area was given to the rig later, and totals are displayed. Readers and exports do not call this.
+    unit of area, the area was given to the rig later, and totals are displayed. Readers and exports do not call this
+    function.
 
     >>> from steadyslip.core.written import display_units
     >>> with display_units(["MPa", "N/um", "cm^2"]):

@@ -88,7 +88,7 @@ def _pairs(
 ) -> list[tuple[str, FrozenRecord | None, FrozenRecord | None]] | None:
     """Prefix and members of both records for each member of a field; None if the field has no comparable members.
 
-    A member that only one of the records has is None in the other's place.
+    If only one of the records has a member, None stands for the missing member of the other record.
     """
     if not isinstance(role, Part) or one is None or other is None:
         return None

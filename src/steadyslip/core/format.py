@@ -30,8 +30,8 @@ _FINE = ("arcsec", "arcmin")
 def own_units(names: frozenset[str]) -> Mapping[Dimension, tuple[str, ...]]:
     """Display units among `names` by dimension, where a unit differs from the default by more than a leading prefix.
 
-    Also included: speeds and angular quantities with any prefix; forces and stresses if all of them are in plain N or
-    Pa. Angles get the arcsec or arcmin of angular speeds and the reverse.
+    Units of speeds and angular quantities are included with any prefix; units of forces and stresses if all of them are
+    plain N or Pa. If angular speeds have arcsec or arcmin, angles get this unit too, and the reverse.
     """
     found = {kind: set(several) for kind, several in _by_dimension(names).items()}
     loads = {name.partition(" at ")[2] for name in names if " at " in name}

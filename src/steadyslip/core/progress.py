@@ -13,7 +13,7 @@ from contextlib import contextmanager
 def progress_text(text: str, wanted: bool | None = None) -> Iterator[Callable[[str], None]]:
     """Show a spinner with a text during work of unknown length; yields a function that changes the text.
 
-    `wanted` switches it on or off; by default it is on if stderr is a terminal.
+    `wanted` switches the spinner on or off; by default it is on if stderr is a terminal.
     """
     if wanted is False or (wanted is None and not sys.stderr.isatty()):
         yield lambda changed: None

@@ -22,7 +22,7 @@ _PLACE = 1
 def inner_symbol(name: str, **assumptions: bool | None) -> sp.Dummy:
     """Symbol for equations: one object per name and assumptions, reproducible across processes.
 
-    It is unequal to every `sympy.Symbol` and to every `sympy.Dummy` made elsewhere, whatever their names.
+    The symbol is unequal to every `sympy.Symbol` and to every `sympy.Dummy` made elsewhere, whatever their names.
     """
     return sp.Dummy(name, _PLACE, **{key: value for key, value in assumptions.items() if value is not None})
 

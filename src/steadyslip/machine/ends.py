@@ -46,7 +46,7 @@ def body_of(end: Any) -> Any:
 def _is_structure(body: Mapping[str, Any]) -> bool:
     """True for a raw table of a structure, even if the word "structure" is misspelt or missing.
 
-    That fault is reported elsewhere; its points must not be reported as unknown bodies.
+    The misspelt or missing word is reported elsewhere; points of the structure must not be reported as unknown bodies.
     """
     named = body.get("motion", body.get("kind"))
     if named is None:

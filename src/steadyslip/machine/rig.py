@@ -193,8 +193,8 @@ class Rig(FrozenRecord, HasCache):
     def written_as(self, name: str) -> WrittenAs:
         """Unit of a parameter in the file, and the load (N) at which friction per load is printed without such a unit.
 
-        The load is the contact's normal force, or else a load in the file for another parameter of the contact, or else
-        0, which prints friction per load. It is None for parameters that belong to no contact.
+        The load is the normal force of the contact; if this is unknown, a load in the file for another parameter of the
+        contact; else 0, with which friction is printed per load. It is None for parameters that belong to no contact.
         """
         prefix = next((own.prefix for own in self.laws_by_contact().values() if name.startswith(own.prefix)), None)
         if prefix is None:
@@ -218,7 +218,7 @@ class Rig(FrozenRecord, HasCache):
     def feed(self) -> tuple[float, bool]:
         """Ratio of the motion that users give to the motion of the drive, and True if the motion given is a rotation.
 
-        Users give the motion of the body in `velocity_of`, or else that of the drive.
+        Users give the motion of the body in `velocity_of`, or, without this entry, the motion of the drive.
         """
         return 1.0, bool(self.drive.turns)
 
@@ -233,8 +233,8 @@ class Rig(FrozenRecord, HasCache):
     def kept_zeros(self, name: str | None = None) -> tuple[str, ...]:
         """Names of parameters that are zero but stay in the equations, so that they can be varied from zero.
 
-        For a machine at most `name`, the parameter that is varied: further masses and dampings would raise the degree
-        of its polynomial and hide other edges.
+        For a machine this is at most `name`, the parameter that is varied: further masses and dampings would raise the
+        degree of the characteristic polynomial and hide other edges.
         """
         raise NotImplementedError
 

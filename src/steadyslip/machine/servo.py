@@ -20,8 +20,8 @@ from steadyslip.machine.mechanism import Limits
 class MachineDrive(FrozenRecord, family="drive of a machine"):
     """Base of drives of machines; `velocity` is that of the driven body, or of the load point, ``drive`` in links.
 
-    With `velocity_of`, the given velocity is that of another body, such as the feed of a table; the constructor of the
-    machine converts it.
+    If `velocity_of` names another body, the given velocity is that of this body, such as the feed of a table; the
+    constructor of the machine converts it.
     """
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")

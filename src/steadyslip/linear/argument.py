@@ -1,7 +1,7 @@
 """Count of roots right of the imaginary axis of sums of polynomials times exp(−sh), by the argument principle.
 
-Where one term is larger than all others together, the argument of the sum follows that of the term, however long the
-delays are. The axis needs to be resolved only near the few frequencies at which two terms are equal in size.
+Where one term is larger than all other terms together, the argument of the sum follows that of this term, however long
+the delays are. The axis needs to be resolved only near the few frequencies at which two terms are equal in size.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Eigenvalues with many digits, from the characteristic matrix evaluated by mpmath.
 
 If stiffnesses or velocities are twenty decades apart, double precision has no correct digit of some eigenvalues. Here
-the number of digits is doubled until all eigenvalues agree with those of the step before, or of another method.
+the number of digits is doubled until all eigenvalues agree with those computed before, or by another method.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""Coefficient of the highest power of s under delays: zeros right of the imaginary axis, and lower bounds there.
+"""Coefficient of the highest power of s under delays: does it vanish right of the imaginary axis, and its lower bounds.
 
 In Σ p_j(s) exp(−s h_j) the highest power has the coefficient Σ c_j exp(−s h_j). Each h_j is the sum of a set of delays
 τ_i, so that the coefficient is P(x) = Σ c_j Π x_i with x_i = exp(−s τ_i), in which no x_i occurs twice in a term. If P
 vanishes for some |x_i| <= 1, then for delays arbitrarily near the given ones infinitely many roots lie right of the
 axis or arbitrarily close to it: the equations are ill-posed (strong stability of neutral equations, Hale & Verduyn
 Lunel 1993, section 9.6). P does not vanish if the delayed terms together are smaller than the term without delay. The
-converse is true unless terms are products: for two equal bodies P = (1 + b x)(1 + b y) vanishes for |b| >= 1, not
-already for |b| > 0.41.
+converse is true unless terms are products: for two equal bodies P = (1 + b x)(1 + b y) vanishes for |b| >= 1 only,
+although the delayed terms together exceed the term without delay for |b| > 0.41.
 """
 
 from __future__ import annotations

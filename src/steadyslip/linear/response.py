@@ -1,4 +1,4 @@
-"""Small-signal response of friction and contact: the ingredients of the paper's closed form.
+"""Small-signal response of friction and contact: the quantities in the paper's closed form.
 
 For a law with one memory variable, τ̂ = [f − ĥ(s)] v̂ + [f1 + ĥ1(s)] σ̂ with one rate of decay r (eqs
 5-9, 13-16). Instead of the paper's λ and λ1 (infinite for Prakash–Clifton) this uses

@@ -1,7 +1,7 @@
 """Rightmost roots of quasi-polynomials Σ p_j(s) exp(−s h_j), shapes as in `quasipolynomial`.
 
 Padé approximants of the delays give starting values, Newton's method the roots themselves, and a count of all roots
-right of a line shows that none is missing. If one is missing, real parts are found by bisection with such counts.
+right of a line shows that none is missing. If a root is missing, real parts are found by bisection with such counts.
 """
 
 from __future__ import annotations

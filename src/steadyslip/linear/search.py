@@ -3,8 +3,9 @@
 The parameter is sampled over its range; where the status (stable, unstable, no steady sliding) of two samples
 differs, the change is bracketed and narrowed to rounding. Dips of the damping between samples are followed,
 so that a narrow window is not stepped over. Samples whose status depends on rounding are left out: a rig on
-its edge has that edge in every parameter that moves it, and none in the others. For the stiffness itself the
-edges are exact (theory 3), and so are those of every parameter that enters linearly in a machine (theory 11).
+an edge has this edge in every parameter that moves the edge, and no edge there in other parameters. For the stiffness
+itself the edges are exact (theory 3), and so are those of every parameter that enters linearly in a machine (theory
+11).
 """
 
 from __future__ import annotations

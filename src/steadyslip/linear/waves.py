@@ -2,7 +2,7 @@
 
 For rigs with delays the conditions "P(iω)/Q(iω) is real" and "|A(iω)| = |B(iω)|" have this form. Terms that cancel are
 removed from the coefficients, so that bounds of the derivatives are tight. Zeros are enclosed by bisection: with
-|f''| ≤ K on an interval of half width r about m there is none where |f(m)| > |f'(m)| r + K r²/2, and one at most where
+|f''| ≤ K on an interval of half width r about m there is no zero if |f(m)| > |f'(m)| r + K r²/2, and at most one if
 |f'(m)| > K r; all other intervals are halved.
 """
 

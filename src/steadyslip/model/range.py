@@ -4,8 +4,8 @@ The slopes enter the characteristic polynomial, so its coefficients are checked:
 overflows, makes a coefficient infinite or NaN. All stages check the range before they compute.
 
 An exponential that underflows must not change the degree. The Stribeck term of friction contains exp(−(v/v_S)²): above
-26 Stribeck velocities that is below exp(−700), and for a body without mass a root is lost with it, or is only rounding
-error. Single rigs, arrays of rigs and pages use the functions here.
+26 Stribeck velocities it is below exp(−700). For a body without mass, a root is then lost, or is only rounding error.
+Single rigs, arrays of rigs and pages use the functions here.
 """
 
 from __future__ import annotations

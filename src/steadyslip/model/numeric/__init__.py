@@ -1,4 +1,4 @@
-"""Machines of any size in numbers: matrices and contacts, steady sliding, eigenvalues, edges; no machine-wide symbols.
+"""Machines of any size by numbers, not symbols: matrices and contacts, steady sliding, eigenvalues, edges.
 
 Laws enter by their expressions, contact by contact; the symbolic Model of a machine is not used.
 """

@@ -1,6 +1,6 @@
 """Steady stresses of one contact, and derivatives at steady sliding, evaluated from the expressions of its laws.
 
-Compiled once for each pair of laws with the same structure, whatever machine they belong to.
+Code is compiled once for each pair of laws with the same structure, whatever machine they belong to.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A machine in numbers at steady sliding, and the same machine with one parameter varied."""
+"""A machine given by numbers at steady sliding, and the same machine with one parameter varied."""
 
 from __future__ import annotations
 

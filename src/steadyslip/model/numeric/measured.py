@@ -1,9 +1,9 @@
-"""Growing roots of a machine whose structure is a measured response: turns of det(I + R G) round 0 (theory 13).
+"""Growing roots of a machine whose structure is a measured response, counted by det(I + R G) (theory 13).
 
 R(iω) is the receptance at the contacts, in their slips and distances, and G(s) the stiffness with which the contacts
-answer. Beyond the band the structure is passive: with the part of G that only stores and takes energy, the angles at
-the end of the band limit how far the determinant can turn. The rest of G, the push of friction by a changing normal
-force, must be small in the highest octave.
+answer. The number follows from the turns of the determinant around 0. Beyond the band the structure is passive: with
+the part of G that only stores or dissipates energy, angles at the end of the band limit how far the determinant turns.
+The rest of G, the push of friction by a changing normal force, must be small in the highest octave.
 """
 
 from __future__ import annotations

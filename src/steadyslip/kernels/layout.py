@@ -171,7 +171,7 @@ class Final(IntEnum):
 
 
 class Held(IntEnum):
-    """Elements of the array with the progress of a held rig's motion over calls of `follow_held`."""
+    """Elements of the array with the progress, over calls of `follow_held`, of a rig that holds a place."""
 
     TIME, END, STOP = 0, 1, 2
     """Present time, end of the target's segment, and time of the next sample or change of force (s)."""
@@ -350,9 +350,9 @@ class Routines(NamedTuple):
     watch_group : frequent events within the last step, for `GROUP` lanes from lane `number` on
     rates_lanes, see_lanes : rates; observables (all lanes)
     extend_lanes, look_lanes : `extend`; observables at `Row.NEXT_TIME`, within the last step (all lanes)
-    bristles : for a held rig, whose record is its constants: ``array`` = inputs (slip rates and memories of the m
-        contacts, with the normal stress after the slip rate if it varies), then friction forces and rates of the
-        memories, then their slopes in the inputs
+    bristles : for a rig that holds a place, whose record has its constants: ``array`` = inputs (slip rates and memories
+        of the m contacts, with the normal stress after the slip rate if it varies), then friction forces and rates of
+        the memories, then the derivatives of these by the inputs
     """
 
     step: Routine

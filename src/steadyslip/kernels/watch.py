@@ -1,8 +1,9 @@
 """Program that finds frequent events in a group of lanes at once and updates their statistics, if no log is kept.
 
 Extremes of velocity, and begin and end of slip, are roots of the velocity variable's dense output or of its derivative.
-Lanes with other cases keep their flag for the driver: lost contact, several events within a step, the end of fast slip,
-backward slip, begin or end of slip while inputs change, a root that is not found in `ROUNDS` iterations.
+In other cases a lane keeps its flag, and the driver finds the events: lost contact, several events within a step, the
+end of fast slip, backward slip, begin or end of slip while inputs change, a root that is not found in `ROUNDS`
+iterations.
 """
 
 from __future__ import annotations

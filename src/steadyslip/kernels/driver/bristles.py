@@ -1,6 +1,6 @@
-"""Rosenbrock steps of a held rig: Y' = A Y + H f(G Y), where the model's routine computes friction and bristles f.
+"""Rosenbrock steps of a rig that holds a place: Y' = A Y + H f(G Y), with friction and bristles f by a model's routine.
 
-Arrays of `Bristles`: constants R of the routine; the tableau, whose rows are the arguments of the stages and the
+`Bristles` are these arrays: constants R of the routine; the tableau, with rows for the arguments of the stages and the
 result, the couplings, the error, three rows of dense output, and γ; A, G, H; typical sizes of the variables Y.
 """
 

@@ -1,8 +1,9 @@
-"""Motion of a held rig as long as its `HeldMode` (sticking contacts, active limits) does not change.
+"""Motion of a rig that holds a place, as long as its `HeldMode` (sticking contacts, active limits) does not change.
 
 The state is that of `steadyslip.nonlinear.hunting.plant`. The motion of a linear system over a fixed time is a product
-with one matrix (a *passage*), also between two samples of a controller, whose force is constant there. With bristles it
-is integrated by steps of `bristles`. A step in which the mode may change is left to the caller, at its start.
+with one matrix (a *passage*), also between two samples of a controller, as its force is constant there. With bristles
+the motion is integrated by steps of `bristles`. Before a step in which the mode may change, control returns to the
+caller.
 """
 
 from __future__ import annotations

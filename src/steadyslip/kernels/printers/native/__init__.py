@@ -1,1 +1,1 @@
-"""The driver as LLVM assembly."""
+"""Translation of the driver to LLVM assembly."""

@@ -1,7 +1,7 @@
 """Roles: types of record fields and function arguments, which check, describe, read and write values.
 
 Numbers (`Parameter`) and measured columns (`Series`) are here; choices, text, integers and names are in `entries`.
-Other layers derive their own from `Entry`.
+Other layers derive further roles from `Entry`.
 """
 
 from __future__ import annotations

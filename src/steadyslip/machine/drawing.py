@@ -1,7 +1,7 @@
 """Sketch of a machine: layout of bodies, links, contacts and drive with their names and values.
 
-Bodies are placed in columns, ordered by the number of links from the drive; bodies in sliding contact with a body of
-this row are placed above or below it. A `Pencil` is a drawing back end: `steadyslip.figures` has one for Matplotlib,
+Bodies are placed in columns, ordered by the number of links from the drive; a body in sliding contact with one of these
+is placed above or below it. A `Pencil` is a drawing back end: `steadyslip.figures` has one for Matplotlib,
 `steadyslip.explorer` one for SVG. Lengths are in units of the drawing.
 """
 

@@ -1,4 +1,4 @@
-"""Replacement of links by rigid ones: the link is removed and its two bodies become one."""
+"""Rigid links: a link is removed, and its two bodies become one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Matrices of a structure in SI units, and smaller ones by the reduction of Craig and Bampton."""
+"""Matrices of a structure in SI units, and smaller matrices by the reduction of Craig and Bampton."""
 
 from __future__ import annotations
 

@@ -30,8 +30,8 @@ COMMANDS = (
 )
 WRITTEN = (".html", ".png", ".svg", ".pdf", ".csv", ".nc", ".toml")  # files that commands write
 GARBAGE = 300_000
-"""Objects created between two garbage collections: more than a verdict creates, some 2·10⁵ by imports and formulas,
-most of which last. Python's default of 700 takes a tenth of its time."""
+"""Number of new objects after which garbage is collected: more than a verdict creates, some 2·10⁵ by imports and
+formulas, most of which last. With Python's default of 700, collections take a tenth of the time of a verdict."""
 
 
 class _Conversion:

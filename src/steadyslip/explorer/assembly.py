@@ -71,7 +71,7 @@ DEFAULTS = {
 WORKER_MODULES = ("motion",)
 """Modules of the worker; the page also sends it the runtime and the driver as text."""
 WORKER_ENTRIES = ("Motion", "serve")
-"""Names of these modules that the worker's own code uses."""
+"""Names in `WORKER_MODULES` that the worker's own code uses."""
 MOTION_KEYS = ("layout", "routines", "segments")
 """Entries of a kernel that `web/motion.js` uses besides its programs."""
 POLICY = (

@@ -80,7 +80,7 @@ def split_code(text: str) -> Iterator[tuple[str, bool]]:
 
 
 def _strip_spaces(found: re.Match[str]) -> str:
-    """Match without spaces around its signs, except between + + and - -, which would join to ++ and --."""
+    """Text of a match without spaces around signs, except between + + and - -, which would become ++ and --."""
     signs, whole, text = found[1], found[0], found.string
     before = whole[0] == " " and signs[0] in "+-" and text[: found.start()].endswith(signs[0])
     after = whole[-1] == " " and signs[-1] in "+-" and text[found.end() :].startswith(signs[-1])

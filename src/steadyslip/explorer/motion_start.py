@@ -64,7 +64,7 @@ class Shares:
         return [*self.pushed.values(), *self.pressed.values(), *self.blown.values()]
 
     def places(self) -> dict[str, dict[str, int]]:
-        """Index of each share after the normal stresses in R, by kind of disturbance (pull, normal, blow) and name."""
+        """Index of each share, counted in R from after the normal stresses, by kind of disturbance and by name."""
         order = {symbol: place for place, symbol in enumerate(self.symbols)}
         along = {name: symbol for name, symbol in self.pushed.items() if not name.endswith(NORMAL)}
         named = {"pull": along, "normal": self.pressed, "blow": self.blown}

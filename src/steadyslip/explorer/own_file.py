@@ -33,7 +33,7 @@ class OwnFile:
     given: Mapping[str, ParameterSource]
 
     def source_fields(self, name: str) -> dict[str, Any]:
-        """Data on a parameter's source in the file: ``own`` is its unit as written, size of the unit in SI, and text.
+        """Data on a parameter's source in the file; ``own``: unit as written, size of the unit in SI, and text.
 
         ``factor`` and ``unit`` are added if the file gives a value per unit area of a rig with totals; ``si`` in the
         opposite case; ``was`` is the value in the file if the rig's differs. Empty if the file does not give the

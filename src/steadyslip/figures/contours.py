@@ -115,7 +115,7 @@ def draw_levels(
 
 
 def pieces_of(path: Path) -> list[Array]:
-    """Pieces of a path of straight lines, each (n, 2) with all vertices; `Path.to_polygons` would drop some."""
+    """Pieces of a path of straight lines, each (n, 2), with all vertices; `Path.to_polygons` would drop vertices."""
     vertices = np.asarray(path.vertices)
     starts = [0] if path.codes is None else np.flatnonzero(path.codes == Path.MOVETO)
     return [piece for piece in np.split(vertices, starts[1:]) if len(piece) > 1]

@@ -119,7 +119,7 @@ def _stiffnesses(rig: Slider, along: str, own: float, ends: Any, given: Any) -> 
 
 
 def _crossings(rig: Slider, along: str, ends: Any, k: Any) -> tuple[list[float], list[Any]]:
-    """Ends of the stable intervals within the range of `k` (Pa/m); the eigenvalues on the imaginary axis at each."""
+    """Ends of the stable intervals within the range of `k` (Pa/m), and eigenvalues on the imaginary axis at them."""
     edges, crossings = [], []
     for edge in np.unique(ends[(ends >= k[0]) & (ends <= k[-1])]):
         found = eigenvalues(rig, {along: edge})

@@ -25,7 +25,7 @@ from steadyslip.verdict.words import PACE, format_parameter
 _SPAN_FACTOR = 100.0  # ranges are drawn from value / 100 to value × 100
 LOST = ("lock-up", "lift-off", "no solution")
 """Kinds of edges beyond which no steady sliding exists."""
-_MAX_PARAMETERS = 24  # rows of `stable_ranges`, so that the figure fits on a page (by trial)
+_MAX_PARAMETERS = 24  # largest number of rows of `stable_ranges`, so that the figure fits on a page (by trial)
 
 
 def machine_verdict(found: Analysis) -> np.ndarray:

@@ -18,7 +18,7 @@ from steadyslip.figures.style import axes_or_new, is_narrow, new_panels
 from steadyslip.maps.view.cut import View, axes_of, take
 from steadyslip.maps.view.map_result import MapResult
 
-MAX_FACETS = 6  # panels of one figure: two rows of three
+MAX_FACETS = 6  # largest number of panels of one figure: two rows of three
 
 
 def map_figure(

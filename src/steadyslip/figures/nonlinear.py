@@ -178,7 +178,7 @@ def _draw_velocities(
 
 
 def _draw_ends(branch: CycleBranch, ax: Axes, axis: tuple[float, float], speed: float, steady_speed: float) -> None:
-    """Mark peak and lowest velocity at the ends of the branch and of the doubled one, by kind of end, with the reason.
+    """Mark peak and lowest velocity at the ends of the branch and of its doublings, by kind of end, with the reason.
 
     `axis` and `speed` as in `_draw_velocities`; `steady_speed` (m/s) is the velocity of steady sliding at the onset.
     """

@@ -81,7 +81,8 @@ EDGES: dict[str, dict[str, Any]] = {
     "drift": {"color": BLACK, "linewidth": 2, "linestyle": (0, (5, 1.5, 1, 1.5))},
     "no steady sliding": {"color": BLACK, "linewidth": 1.5, "linestyle": (0, (3, 2))},
 }
-"""Line styles of edges by what begins beyond: a growing oscillation, growth without oscillation, no steady sliding."""
+"""Line styles of edges by what happens beyond: growing oscillation, growth without oscillation, no steady sliding.
+"""
 AREAS: dict[int, tuple[str, dict[str, Any]]] = {
     STABLE_CODE: ("stable", {"facecolor": STABLE, "linewidth": 0}),
     UNSTABLE_CODE: ("unstable", {"facecolor": UNSTABLE, "linewidth": 0}),

@@ -11,7 +11,7 @@ from steadyslip.files.output import whole_file
 
 _PACKAGE = Path(__file__).parents[1]
 _PLACES = (_PACKAGE / "examples", _PACKAGE.parents[1] / "examples")
-"""Folders of the examples: in an installed package, and in a checkout (the original)."""
+"""Folders of the examples: in an installed package, and in a checkout of the repository (the original)."""
 _HEADLINE = re.compile(r"(?s)# (.*?)(?:[.](?=\s+[A-Z])|[:;]\s|\?|\s\(|[.]?\s*\Z)")
 """First statement of the comment at the head of a file, without text in brackets."""
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from steadyslip.core.errors import NotAvailable
 
 MOST_TEXT = 2**20
-"""Largest allowed size of a hand-written file (rig, protocol, map, fit), bytes; chosen by trial, far above any."""
+"""Largest allowed size of a hand-written file (rig, protocol, map, fit), bytes; by trial, far above real ones."""
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",

@@ -298,7 +298,7 @@ class _KnownNodes:
 
 
 class _Batches:
-    """Function that computes new points, as separate maps next to the map so that it can be interrupted."""
+    """Function that computes new points, as separate maps next to the map, so that computation can be interrupted."""
 
     def __init__(
         self, found: MapResult, of: str, level: float | None, compute: Sequence[AnyMeasure] | None, lattice: _Lattice,

@@ -13,7 +13,7 @@ LATE_TOLERANCE = 0.01
 """Largest relative change allowed of slips, their peaks and the times between them, or of the range of velocity."""
 NAMES = ("slip", "peak_velocity", "recurrence")
 FEWEST = 3
-"""Least number of leading slip events that must agree in irregular motion: with two times between them."""
+"""Least number of first slip events that must agree in irregular motion; between three lie two recurrence times."""
 STILL = 1e-6  # motion is steady if velocity varies by less than this share of its largest value: ten times default rtol
 
 

@@ -56,7 +56,7 @@ def event_unit(name: str) -> str:
 
 
 def event_names(rig: Rig) -> tuple[str, ...]:
-    """Names of the columns of `Ensemble.events`; for a machine each contact has its own, with its name as prefix."""
+    """Names of the columns of `Ensemble.events`; a machine has them for each contact, with its name as prefix."""
     if not rig.contact_names:
         return tuple(EVENT_UNITS)
     return tuple(f"{contact}.{_contact_column(name)}" for contact in rig.contact_names for name in EVENT_UNITS)

@@ -45,7 +45,7 @@ def observable_units(model: Model, acting: Targets) -> dict[str, str]:
 
 
 def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
-    """SI units of the observables of a machine, by name with that of the body or contact; forces, not stresses."""
+    """SI units of the observables of a machine (forces, not stresses), by name, with the body or contact as prefix."""
     units: dict[str, str] = {}
     for one in model.coordinates:
         if one.inner:

@@ -14,7 +14,7 @@ from steadyslip.machine.rig import Rig
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS, Piece
 
-_MOST = 4  # number of pieces that `protocol_words` lists, so that it is a line or two (by trial)
+_MOST = 4  # largest number of pieces that `protocol_words` lists, so that the text is a line or two (by trial)
 
 
 def piece_words(rig: Rig, piece: Piece) -> tuple[str, list[str]]:

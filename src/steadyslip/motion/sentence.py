@@ -33,7 +33,7 @@ ON = ": after {time} between {speeds}, and still growing"
 CREEPS = ", at up to {peak}"
 """Addition for an event that is mostly creep: its peak velocity is more than `SUDDEN` times its mean."""
 DIFFERS = " ({before} the time before)"
-"""Addition with the slip of the forward event before the last, if it differs by more than `ALIKE`."""
+"""Addition with the slip of the last but one forward event, if it differs by more than `ALIKE`."""
 DIGITS = 3  # significant digits of quantities in sentences
 TREND = 0.01  # an oscillation is steady if its swings grow or decay by no more than this in the last half of a run
 LAST = 0.9  # swings that grew before must be alike after this share of a run for an oscillation to be steady

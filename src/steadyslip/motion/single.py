@@ -35,7 +35,7 @@ from steadyslip.protocol.inputs import segment_of
 
 CLOSER = 0.1  # factor on rtol for a third run, if the second run, with more variables for delayed signals, differs
 OWN_STEPS = 500_000
-"""Limit of steps of a run that records them: a point takes some hundred bytes, and order 8 records four per step."""
+"""Limit of steps of a run that records its steps: a point takes 100 bytes, and order 8 records four per step."""
 
 
 @checked(until=DURATION, times=TIMES)

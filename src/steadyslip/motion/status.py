@@ -13,7 +13,8 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.weights import slip_rates
 
 UNRESOLVED = "delay not resolved"
-"""Status of runs with a delay that change if delayed signals have more variables (`steadyslip.motion.late_check`)."""
+"""Status of a run with a delay that changes if delayed signals get more variables (`steadyslip.motion.late_check`).
+"""
 WORDS = (*STATUSES, "interrupted", "no steady sliding", "ill-posed", "out of range", UNRESOLVED)
 NEEDS_MASS = "needs a mass: without it the block takes any velocity at once"
 THROUGH_DASHPOT = "acts through a dashpot (damping, of a link, a kd) as an infinite force"

@@ -65,7 +65,7 @@ class Targets:
 
 NOTHING = Targets()
 LET_GO = (LOAD_POINT, FREE, SWITCH)
-"""First targets in `Targets.pushes` if the drive is released and moves again."""
+"""First targets in `Targets.pushes` if the protocol releases the drive for some time."""
 
 
 def targets(rig: Slider | Machine, plan: Protocol) -> Targets:

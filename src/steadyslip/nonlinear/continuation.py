@@ -78,7 +78,7 @@ class SolutionCurve:
         self.rounding, self.residuals, self.jacobian, self.improved = rounding, residuals, jacobian, improved
         self.weights: Any = 1.0 if weights is None else weights
         self.bend = float(np.sqrt((1 - most_turn) / (1 + most_turn)))
-        """tan of half the largest angle: distance of an arc that turns by it from its tangent, per length."""
+        """tan of half the largest angle: distance from its tangent, per length, of an arc that turns by this angle."""
 
     def size(self, u: Array) -> float:
         """Weighted length of a difference of unknowns (n+1,)."""

@@ -41,7 +41,7 @@ ENDED = ("contact lost", "blow-up", "stuck", "no velocity")  # statuses that end
 
 @dataclass(frozen=True, eq=False)
 class FrozenVerdicts(ReadOnly):
-    """Stability of the steady sliding at each moment of a protocol, and the times at which motion departs from it.
+    """Stability of steady sliding at each moment of a protocol, and the time at which motion departs from it.
 
     Attributes
     ----------

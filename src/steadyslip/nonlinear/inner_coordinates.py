@@ -6,8 +6,8 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.model.equations import Model
 
 MOST_INNER = 8
-"""Largest number of degrees of freedom of structures: a branch of cycles takes 5 CPU s with 3, 14 with 5, and with 24
-minutes for compilation alone; a basin's neighbourhood has terms by the fourth power of the number of variables."""
+"""Largest number of degrees of freedom of structures: a branch of cycles takes 5 CPU s with 3 and 14 with 5; with 24
+compilation alone takes minutes. The number of terms in a basin's neighbourhood grows as the fourth power of it."""
 
 
 def inner_count(model: Model) -> int:

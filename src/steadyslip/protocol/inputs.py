@@ -51,7 +51,7 @@ def integral_to(t: Any, value: Any, slope: Any, waves: Waves, cosine: Function) 
 
 
 def segment_of(segments: Segments, lane: Any, time: Array) -> Indices:
-    """Index of the segment at each time: the later one at a breakpoint, the last one at the end.
+    """Index of the segment at each time: at a breakpoint the later segment, at the end the last segment.
 
     Parameters
     ----------

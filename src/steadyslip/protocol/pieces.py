@@ -19,7 +19,7 @@ from steadyslip.protocol.curves import Array, Curve, Jump, Wave, column, join_co
 from steadyslip.protocol.protocol import DISTURBANCE, NORMAL_STRESS, Piece
 
 FORCES = ("N", "N m")
-"""Units in which rigs with an area and machines give stresses."""
+"""Units in which the stresses of pieces are given for machines and for rigs with an area."""
 
 
 class StressStep(Piece):

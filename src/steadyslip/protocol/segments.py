@@ -179,7 +179,7 @@ def _terms(protocol: Protocol, velocity: Any, channels: tuple[int, ...]) -> _Ter
             if piece.channel == LOAD_POINT:
                 drive.append(curve)
                 present = curve.right[:, -1]
-            elif not (protocol.lets_go and piece.frees_load_point):  # `spans_of` adds those to the creep spans
+            elif not (protocol.lets_go and piece.frees_load_point):  # `spans_of` adds these pieces to the creep spans
                 terms.curves.append((channel, curve))
         if (wave := piece.wave()) is not None:
             terms.waves.append((channel, wave))

@@ -23,7 +23,7 @@ from steadyslip.verdict import analyze
 
 _FOUND = ("parameter", "value", "95 %")
 _FITTED = "Values that were fitted."
-_OVER_STRESS = "k/σ"  # stiffness over normal stress, as the text of a fit names it
+_OVER_STRESS = "k/σ"  # symbol for stiffness over normal stress in the text of a fit
 
 
 def record_names(fit: Fit) -> str:

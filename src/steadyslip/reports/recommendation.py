@@ -353,7 +353,7 @@ class _Moved(NamedTuple):
 
     @property
     def far(self) -> str:
-        """``yes`` if all edges are at least `BEYOND_EDGE` away, else ``no``."""
+        """Text ``yes`` if all edges are at least `BEYOND_EDGE` away, else ``no``."""
         return "yes" if self.distance >= BEYOND_EDGE else "no"
 
 

@@ -145,7 +145,7 @@ def motion(analysis: Analysis, title: str = "The motion", source: str = "") -> I
 
 
 def _last_swings(run: History) -> History:
-    """Motion cut to its last `SWINGS_DRAWN` swings, if it has more than twice as many.
+    """Motion, cut to its last `SWINGS_DRAWN` swings if it has more than twice that number.
 
     Swings are slip events or, without any, the times at which a slip rate rises through its median.
     """
@@ -262,7 +262,7 @@ def input_letters(model: Model | None, rig: Slider | Machine) -> dict[str, str]:
 
 
 def subscript_of(name: str) -> str:
-    """Subscript of letters for a member, from the dotted name of its parameter: its second part."""
+    """Subscript for the letters of a member's parameters: the second part of the dotted name `name`."""
     return name.split(".")[1].replace("-", "_")
 
 

@@ -82,7 +82,7 @@ class Surroundings:
         )
 
     def steady_stress(self, contact: ContactLaw) -> float:
-        """Steady normal stress of the rig (Pa), the last if there are several steady states."""
+        """Steady normal stress of the rig (Pa); that of the last steady state if there are several."""
         rig = self.rig(contact)
         try:
             if isinstance(rig, Machine):

@@ -201,7 +201,7 @@ def _judged_by_response(rig: Any, kicks: Sequence[str]) -> Analysis:
 
 
 def _leading_mode(rig: Machine, linear: _Linear) -> tuple[dict[str, Any], tuple[Check, ...]]:
-    """Fields `mode` and `origin` of a machine's verdict, and the check of `origin`, which is left None if it fails."""
+    """Fields `mode` and `origin` of a machine's verdict, and the check of `origin`; `origin` is None if it fails."""
     known = linear.numbers["growth_rate"] not in (math.inf, None)
     first = next(iter(linear.numbers.get("eigenvalues", ()) if known else ()), None)
     if first is None:

@@ -111,7 +111,7 @@ ILL_POSED = (
     "the equations are ill-posed: mass, direct effect and dampings do not outweigh what friction, directly or by way "
     "of the normal stress, may fall by at once, so any small lag grows at once"
 )
-"""Reason given for a slider that is ill-posed without a delay, whatever the term that causes it."""
+"""Reason given for a slider that is ill-posed without a delay, whichever term causes this."""
 
 DELAY_IS_ILL_POSED = (
     "the equations are ill-posed: on a body without mass, what follows velocity late (by {delays}) outweighs what "

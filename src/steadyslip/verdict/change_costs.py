@@ -10,9 +10,9 @@ from __future__ import annotations
 
 SPEED = "drive.velocity"
 STEP = 4.0
-"""Cost ratio of neighbouring kinds: the dearer kind is changed only if that saves two doublings of the cheaper one.
+"""Cost ratio of neighbouring kinds: at 4 a dearer parameter is changed only if that saves two doublings of a cheaper.
 
-By choice: with 1 kinds would make no difference; with 64 the whole range of the cheaper kind would come first.
+The value is a choice: at 1, kinds would make no difference; at 64, the cheaper kind's whole range would come first.
 """
 SETTING, PART, TASK = 1 / STEP, 1.0, STEP
 """Cost of doubling or halving a setting of the drive, a part, and the speed."""

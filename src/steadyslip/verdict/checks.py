@@ -161,7 +161,7 @@ def _law_residuals(
 
 
 def relative_errors(point: OperatingPoint) -> tuple[Array, NDArray[np.bool_]]:
-    """Relative error of each eigenvalue, and mask of those accurate enough to be reported; both (n,).
+    """Relative error (n,) of each eigenvalue, and mask (n,) of the eigenvalues accurate enough to be reported.
 
     Eigenvalues that nearly coincide or are zero are reported even with larger errors if the whole spectrum is
     `decided`.
@@ -217,7 +217,7 @@ def missing_edges(names: Sequence[str], why: str) -> Iterator[Check]:
 def edge_checks(
     rig: Rig, margins: Sequence[Margin], missing: Sequence[str], branch: int
 ) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
-    """Margins without the edges that fail their check, and the checks: roots on both sides of each edge.
+    """Margins without edges that fail the check of their roots on both sides, and all these checks.
 
     A failed check is added that names the parameters in `missing`, whose edges were not searched for.
     """

@@ -41,11 +41,11 @@ class Window(Displayed):
     written_as: WrittenAs = field(default=WrittenAs(), repr=False)
     """Notation of the parameter in the rig's file, kept in printed values."""
     beyond: tuple[str, float] | None = None
-    """Side (above, below) and value of an edge outside `limits`, beyond which the rig without tolerances is stable."""
+    """Side (above, below) and value of an edge outside `limits` beyond which the rig, without tolerances, is stable."""
 
     @property
     def nearest(self) -> float | None:
-        """End of a window nearest to the rig's own value; None inside a window or without one."""
+        """End of a window nearest to the rig's own value; None without windows, or if the value lies inside one."""
         if not self.windows or any(low <= self.value <= high for low, high in self.windows):
             return None
         return ends_about(self.value, [end for one in self.windows for end in one], self.unit)[0]

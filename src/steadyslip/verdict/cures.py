@@ -43,7 +43,7 @@ DESIGN = (
     ("stiffness", "axial_stiffness", "kp", "kv"), ("damping", "kd", "ki", "tn"), ("mass", "inertia"), (PRELOAD,),
     ("viscous",), ("velocity",),
 )  # fmt: skip
-"""Last parts of the names of parameters that a designer chooses, in the order they are tried."""
+"""Last parts of the names of parameters that a designer chooses, in the order in which they are tried."""
 OWN_VALUES = (
     "without tolerances this is of the rig's own values{}, whatever chance is asked for;\n"
     'its file takes them as stiffness = "12 ± 20 % N/um", or "12 +- 20 % N/um"'

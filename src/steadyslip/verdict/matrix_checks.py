@@ -106,7 +106,7 @@ def _imbalance(point: MachinePoint) -> float:
 def matrix_edge_checks(
     point: MachinePoint, margins: Sequence[Margin], missing: Sequence[str]
 ) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
-    """Margins without the edges that fail their check, and the checks: eigenvalues on both sides of each edge.
+    """Margins without edges that fail the check of the eigenvalues on both sides, and all these checks.
 
     A failed check is added that names the parameters in `missing`, whose edges were not searched for.
     """

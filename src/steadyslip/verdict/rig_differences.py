@@ -111,7 +111,7 @@ def _sorted(
 
 
 def one_word(words: Sequence[str]) -> str:
-    """The common verdict if all `words` are equal, else `PARTLY`."""
+    """The verdict that all `words` have in common, or `PARTLY` if they differ."""
     return words[0] if len(set(words)) == 1 else PARTLY
 
 

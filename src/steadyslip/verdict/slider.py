@@ -88,7 +88,7 @@ def sliding_rows(analysis: Findings) -> list[tuple[str, str]]:
 
 
 def stability_rows(analysis: Findings) -> list[tuple[str, str]]:
-    """Rows (label, text) on stable stiffnesses and the critical one."""
+    """Rows (label, text) on the stable stiffnesses and on the critical stiffness."""
     rows = [("stable for", _stable_set(analysis))]
     if beta := analysis.critical_angular_frequency:
         rows.append(("at the edge", AT_EDGE["at the edge"].format(period=format_quantity(2 * math.pi / beta, "s"))))

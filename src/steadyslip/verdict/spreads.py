@@ -52,7 +52,7 @@ class Spread:
     relative: bool
 
     def moved(self, value: Any) -> Spread:
-        """Distribution with the same tolerance about another value, or about each of an array."""
+        """Distribution with the same tolerance about another value, or about each value of an array."""
         if self.relative and self.value:
             low, high = (value + (end - self.value) * np.abs(value / self.value) for end in (self.low, self.high))
         else:

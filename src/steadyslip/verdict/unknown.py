@@ -91,7 +91,7 @@ class ValuesWithin(Displayed):
 
 
 PER_LOAD = {"1/m": "N/m", "s/m": "N s/m"}
-"""Unit of a contact's total by unit per normal load."""
+"""Unit of a value for the whole contact, by the unit of that value per normal load."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -187,7 +187,7 @@ _KICKS = {
 
 
 def threshold_words(kick: Threshold) -> str:
-    """Clause on a threshold: the kick survived, and what a larger one leads to."""
+    """Clause on a threshold: the kick that is survived, and what a larger kick leads to."""
     name, what = _KICKS[kick.kick]
     at = f" at {kick.at}" if kick.at else ""
     if kick.size == 0:

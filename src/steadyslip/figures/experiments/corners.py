@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 LEVELS = (0.68, 0.95)  # probability inside each contour, as for one and two standard deviations
 STYLES: tuple[Literal["-"], Literal["--"]] = ("-", "--")
-PILE_UP_SHARE = 0.02  # share of draws at an extreme value above which it is a bound of the search (by trial)
-BINS = 48  # bins along each axis for the density of draws: finer than its smoothing (by trial)
+PILE_UP_SHARE = 0.02  # an extreme value at which a larger share of draws lies is a bound of the search (by trial)
+BINS = 48  # number of bins along each axis for the density of draws: finer than its smoothing (by trial)
 MOST_IN_COLUMN = 4  # largest number of panels side by side in 85 mm: a name and three numbers of 7 points take 18 mm
 TWO_COLUMNS = 180 / 25.4  # inches: width of two journal columns with the gap between them
 MAX_DOTS = 4000  # largest number of draws plotted as dots; more dots only darken the panel (by trial)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from steadyslip.experiments import Fit, Record
 
 MAX_LAGS = 60  # largest lag of the autocorrelation that is drawn, samples
-MAX_STEPS = 12  # most panels of `steps`: four rows of three
+MAX_STEPS = 12  # largest number of panels of `steps`: four rows of three
 MIN_STRESS_CHANGE = 0.01  # normal stress is not drawn if its smooth relative change is smaller (by trial)
 ZOOM_SHARES = (0.15, 0.6)  # drawn shares of the times to the previous and to the next step (by trial)
 

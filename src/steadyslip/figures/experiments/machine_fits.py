@@ -15,7 +15,7 @@ from steadyslip.figures.style import axis_label, display_unit
 if TYPE_CHECKING:
     from steadyslip.experiments import MachineFit
 
-MAX_SERIES = 4  # most columns drawn: more would not fit on a page
+MAX_SERIES = 4  # largest number of columns that are drawn: more would not fit on a page
 
 
 def machine_fit(result: MachineFit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.ndarray:

@@ -31,7 +31,7 @@ def stacked_panels(ax: Any, heights: tuple[float, ...], shared: int | None = Non
 
 
 def panel_grid(ax: Any, rows: int, columns: int, size: tuple[float, float]) -> np.ndarray:
-    """Axes of shape (rows, columns): those given, or new ones of a figure of the given size (inches)."""
+    """Axes of shape (rows, columns): the given Axes, or those of a new figure of the given size (inches)."""
     if ax is not None:
         return given_panels(ax, (rows, columns), f"{rows} by {columns}")
     return new_panels(rows, columns, size)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from steadyslip.experiments import Estimate, Population
 
-ROW_OFFSET = 0.15  # vertical offset, in rows, between the estimate of an experiment alone and the pooled one
+ROW_OFFSET = 0.15  # vertical offset, in rows, between the estimate from an experiment alone and the pooled estimate
 
 
 def population(result: Population, ax: Any = None) -> np.ndarray:

@@ -58,7 +58,7 @@ LARGEST = {
     ("transmitted", "1"): Largest(2.0, 10.0),
     ("area", "m^2"): Largest(5.0, 50.0),
 }
-"""Largest values by (kind of parameter or last part of its name, SI unit)."""
+"""Largest known values and limits, by (kind of parameter or last part of its name, SI unit)."""
 WITH_UNIT = 10.0  # factor on the limit for values with a unit, as rings of telescopes are 30 m wide
 REMEDIES = {
     "gear": 'its second body turns faster than the first; a reduction is written "1/{raw:g}", this one "{raw:g}/1"',
@@ -66,9 +66,9 @@ REMEDIES = {
     "1": "a number in per cent is written as a share, {share:g}",
     "": "write the unit that is meant",
 }
-"""Advice by last part of the name, else by SI unit, else ("") for all."""
+"""Advice by last part of a parameter's name, or by SI unit; that of the key "" is for all other parameters."""
 UNDAMPED = 1e-4  # least plausible damping ratio of a dashpot: steel alone has 1e-4 to 1e-3
-SLOWEST_MOTOR = 1e-4  # rad/s, a turn in 17 h: a slower motor may be meant as the speed behind its gear
+SLOWEST_MOTOR = 1e-4  # rad/s, a turn in 17 h: for a slower motor, the speed behind its gear may be meant
 LEAST_REDUCTION = 5.0  # least gear reduction for the warning of slow motors: direct drives do turn as slowly
 BENT = 2e-4  # m: largest plausible bend of bristles before sliding; measured bends are some um to 0.1 mm
 LIGHTEST = 1000.0  # Pa, least plausible normal stress, 10 cm of water: faults and laboratories have ten times as much

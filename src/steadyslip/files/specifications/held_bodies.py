@@ -61,7 +61,7 @@ class HeldBody(NamedTuple):
 
 
 FIXED_END = HeldBody("", False, math.inf, 0.0, 0.0, 0.0, {})
-"""The ground, or the load point of the drive."""
+"""Stands for the ground, or the load point of the drive, at an end of a spring."""
 
 
 class HoldingSpring(NamedTuple):

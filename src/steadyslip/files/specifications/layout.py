@@ -42,7 +42,7 @@ class Section:
 
 
 PROTOCOL = Section("protocol", Protocol)
-"""Table of the protocol, which a rig file may have besides those of the rig."""
+"""Table of the protocol, which a rig file may have in addition to the tables of the rig."""
 
 UNKNOWN = "unknown"
 """Name of the table of intervals of unknown parameters; ignored when a rig is read."""

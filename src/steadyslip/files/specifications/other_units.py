@@ -11,7 +11,7 @@ from steadyslip.core.quantities import parse, units_in
 SizeWarning = tuple[str, str]
 """Name of a parameter, and the text of a warning about its value."""
 Read = Mapping[str, tuple[Any, str]]
-"""Values of a file by dotted name: each as written, and its SI unit."""
+"""Values of a file by dotted name: the value as written, and the SI unit of the parameter."""
 UNITS = {
     "N/m": ("N/um", "N/mm", "N/m"),
     "N m/rad": ("N m/rad", "N m/arcmin", "N m/arcsec", "kN m/rad"),

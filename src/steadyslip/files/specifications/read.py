@@ -72,7 +72,7 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider |
 
 
 def read_whole(path: str | PathLike[str], changes: Iterable[str] = ()) -> RigFileContents:
-    """Contents of a rig file, and the problems found in it; raises RigFileError only if it cannot be read as TOML."""
+    """Contents of a rig file, with the problems found; raises RigFileError only if the file cannot be read as TOML."""
     return read_contents(_not_empty(text_of(path), str(path)), str(path), changes)
 
 
@@ -162,7 +162,7 @@ class RigFileContents:
         return line_of(name, self.lines)
 
     def refuse(self, *others: Problem) -> None:
-        """Raise RigFileError, which lists all problems with their lines, if the file or `others` has any."""
+        """Raise RigFileError, with all problems and their lines, if there are any in the file or in `others`."""
         if self.problems or others:
             every = list(dict.fromkeys([*self.problems, *others]))
             if all(map(self._is_of_change, every)):

@@ -208,7 +208,7 @@ class RigTableReader(TableReader):
         return self._built(Slider, {**arguments, **parts}, "slider.")  # type: ignore[return-value]
 
     def protocol(self, rig: Rig | None = None) -> Protocol | None:
-        """Read the protocol, None if absent; to be called after `rig`, whose area it needs."""
+        """Read the protocol (None if there is none); to be called after `rig`, as the rig's area is needed."""
         if PROTOCOL.name not in self.tables:
             return None
         before = len(self.problems)

@@ -23,7 +23,7 @@ EXAMPLES = {
     "machine": "machines/feed-axis.toml", "protocol": "stick-slip.toml", "fit": "fits/basalt.toml",
     "map": "maps/safe-stiffness.toml",
 }  # fmt: skip
-"""Example file of each other kind."""
+"""Example file for each kind of file that is not a rig with chosen laws."""
 KINDS = ("rig", *EXAMPLES)
 _WIDE = 30  # width (characters) of key and value before the comment
 _HEAD = """# A rig to begin with: replace the numbers, then ask

@@ -39,13 +39,13 @@ class TableReader:
         self.problems: list[Problem] = []
         self.area: float | None = None
         self.feed = 1.0, False
-        """Motion of the load point as given over that of the drive; True if it turns: displacements are then angles."""
+        """Motion of the load point as given in the file over that of the drive; True if it turns (given as angles)."""
         self.in_totals = False
         self.acted_on: Rig | None = None
         self.sections: tuple[Section, ...] = ()
         """Declarations of the file's tables, used for hints on keys in the wrong table."""
         self.values_read: dict[str, tuple[Any, str]] = {}
-        """Parameters read so far by dotted name: as written, and their SI unit."""
+        """Parameters read so far, by dotted name: the value as written, and the SI unit."""
         self.twisted = False
         """True while a torque is read instead of a force."""
 
@@ -155,7 +155,7 @@ class TableReader:
         return Members(found) if len(self.problems) == before else None
 
     def _of_one_spelling(self, raw: Table, name: str) -> Table:
-        """Tables by name, in which parts of a table found under a misspelt name are reported and merged into it."""
+        """Tables by name; parts of a table that are under a misspelt name are reported and merged into that table."""
         tables = {key: one for key, one in raw.items() if isinstance(one, dict)}
         for key, part in tables.items():
             if not all(isinstance(one, dict) for one in part.values()):
@@ -277,7 +277,7 @@ class TableReader:
         return replace(role, unit=TURNING[role.unit]) if self.feed[1] and role.unit in TURNING else role
 
     def worded(self, role: Declared) -> Declared:
-        """Declaration of a parameter for messages: as total if there is an area, with the word force or torque."""
+        """Declaration of a parameter as messages name it: as a total if there is an area, and as a force or torque."""
         if not isinstance(role, Parameter):
             return role
         here = self.in_file_unit(role)
@@ -327,7 +327,7 @@ class TableReader:
 
 
 def _from_short(family: type[FrozenRecord], raw: Any) -> Table | None:
-    """Table equivalent to a value in short form (law name, number or list); None if it is no such value."""
+    """Table that means the same as a value in short form (law name, number or list); None for other values."""
     if isinstance(raw, Mapping):
         return dict(raw)
     if has_choice(family):

@@ -59,7 +59,7 @@ class Slot:
         return unit(self.unit)[0] if self.unit else 1.0
 
     def changed(self, number: float) -> str:
-        """TOML value of another number in the unit of this one."""
+        """TOML value of another `number`, in the unit of the number in this slot."""
         return f'"{number!r} {self.unit}"' if self.unit else repr(number)
 
 
@@ -295,7 +295,7 @@ def _is_read_back(found: RigTemplate, rig: Slider | Machine, names: Sequence[str
     texts = {name: toml_in_si(addresses[name], value) for name, value in values.items()}
     if _read(found.filled({}), []) != rig or _read(found.filled(texts), []) != rig.with_values(values):
         return False
-    for name in found.omitted:  # one at a time: the rig may not allow all of them together
+    for name in found.omitted:  # the omitted parameters one at a time: the rig may not allow all of them together
         value = 0.5 * (addresses[name].value or 1.0)
         try:
             other = rig.with_values({name: value})

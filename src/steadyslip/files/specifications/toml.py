@@ -13,7 +13,7 @@ Table = dict[str, Any]
 MOST_PARTS = 32
 """Most parts of a dotted key; the time of tomllib grows with their cube."""
 MOST_INTEGER = 2**63
-"""Bound of integers, which have 64 bits in TOML."""
+"""Largest allowed size of integers, which have 64 bits in TOML."""
 
 _PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 _LONG_KEY = re.compile(rf"(?<![\w\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS}}}")
@@ -32,7 +32,7 @@ _SLIPS = (
     (re.compile(r"[^\"'#]*=\s*[^\W\d_]"), "a word stands in quotes, as in law = 'lugre'"),
     (re.compile(r"[^\"#]*\"[^\"]*$|[^'#]*'[^']*$"), "a text ends on its line with the quote with which it begins"),
 )
-"""Patterns of common mistakes in TOML lines, and advice; that of the first match is given."""
+"""Patterns of common mistakes in TOML lines, with advice; the advice of the first pattern that matches is given."""
 _PLACE = re.compile(r" \(at line (\d+), column \d+\)$")
 _TWICE = re.compile(r"Cannot declare \((.*?),?\) twice")
 

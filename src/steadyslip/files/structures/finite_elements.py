@@ -19,7 +19,7 @@ from steadyslip.machine.structure_data import MOST_FREEDOM
 _HELD = 0.99e36  # Abaqus writes a stiffness of 1e36 at degrees of freedom that boundary conditions hold
 _MATRICES = {"M": ("mgg", "maa", "mxx", "maax", "m"), "K": ("kgg", "kaa", "kxx", "kaax", "k"),
              "C": ("bgg", "baa", "bxx", "baax", "b", "c")}  # fmt: skip
-"""Names of matrices of Nastran by our letters; those that end with x come with a reduced structure (EXTSEOUT)."""
+"""Nastran's names of the matrices M, K and C; names that end with x belong to a reduced structure (EXTSEOUT)."""
 
 
 class NamedMatrices(dict[str, Array]):
@@ -169,7 +169,7 @@ def _unfolded(frames: Mapping[str, Any]) -> tuple[tuple[str, ...], dict[str, Arr
 
 
 def _lines(name: str, content: bytes) -> Array:
-    """Lines of a text as node, direction, node, direction and entry; without directions they are 0.
+    """Lines of a text as node, direction, node, direction and entry; directions that are not given are 0.
 
     Raises
     ------

@@ -24,7 +24,7 @@ from steadyslip.machine.structure_data import MOST_FREEDOM, StructureData
 LETTERS = ("M", "K", "C", "G")
 """Names in files of the matrices of inertia, stiffness, damping and gyroscopic forces; C and G may be missing."""
 MOST_MATRICES = 4 * 8 * MOST_FREEDOM**2 + 2**20
-"""Largest size of a file of matrices, bytes: four full ones in doubles."""
+"""Largest size of a file of matrices, bytes: four full matrices of doubles."""
 _ANY = "*"  # in file names: stands for the letter of a matrix, or Abaqus's word for it; each file has one matrix
 _WORDS = {"M": ("M", "MASS"), "K": ("K", "STIF"), "C": ("C", "DMPV"), "G": ("G",)}
 _CALCULIX = {"M": ".mas", "K": ".sti"}

@@ -16,7 +16,7 @@ from steadyslip.files.structures.table_text import hertz_of, table_text
 from steadyslip.machine.structure_data import StructureData
 
 FREQUENCY, DAMPING, MASS = "frequency", "damping", "mass"
-"""Columns: Hz, damping ratio, and modal mass in kg, 1 unless given."""
+"""Names of the columns with frequency (Hz), damping ratio, and modal mass (kg; 1 if there is no such column)."""
 _COLUMNS = (
     "frequency (Hz; else as in frequency [rad/s]), damping (ratio), perhaps mass (kg), and of each point, as of tip, "
     "tip.x and tip.y"

@@ -20,7 +20,7 @@ _READERS: dict[str, Callable[..., Any]] = {"matrices": read_matrices, "modes": r
 
 
 def with_structures(tables: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Tables in which the names of files of structures are replaced by their content; the rest is the same.
+    """Copy of the tables in which names of structures' files are replaced by the content of these files.
 
     What cannot be read becomes an `Unread`, which the field of the record refuses with the reason.
     """

@@ -17,7 +17,7 @@ class ConstantNormalStress(PreloadedContact, name="constant"):
 
 
 def pressed_at(stress: float, like: ContactLaw | None = None) -> ContactLaw:
-    """Contact law with a constant normal stress (Pa); if `like` has pores, a copy of it with that effective stress."""
+    """Contact law with a constant normal stress (Pa); if `like` has pores, a copy of it with this effective stress."""
     if isinstance(like, PreloadedContact) and like.has_pores():
         return replace(like, preload=None, steady_normal_stress=stress)
     return ConstantNormalStress(steady_normal_stress=stress)

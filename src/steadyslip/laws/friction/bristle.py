@@ -13,7 +13,7 @@ from steadyslip.core.records import parameter
 from steadyslip.laws.friction.law import Expression, Expressions, FrictionLaw
 
 REST = sp.Rational(1, 10**12)
-"""Fraction of v_S below which the Stribeck curve is made flat: for δ_S < 1 its slope at rest would be infinite.
+"""Share of v_S below which the Stribeck curve is made flat, as its slope at rest would be infinite for δ_S < 1.
 Chosen by trial, far below any velocity of interest."""
 
 

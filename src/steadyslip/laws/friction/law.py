@@ -11,7 +11,7 @@ from steadyslip.core.domains import Condition, nonnegative, positive, real
 from steadyslip.core.records import FrozenRecord, parameter
 
 Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand
-Expressions = tuple[Expression, ...]  # one for each memory variable or state
+Expressions = tuple[Expression, ...]  # one expression for each memory variable or state
 
 
 class FrictionLaw(FrozenRecord, family="friction law"):

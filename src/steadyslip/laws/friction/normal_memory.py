@@ -73,7 +73,7 @@ class NormalMemory(FrozenRecord, family="memory of normal stress"):
         """True if `offset` is overridden: normal stress shifts the state."""
         return type(self).offset is not NormalMemory.offset
 
-    # requirements on the friction law; names are those of its fields
+    # requirements on the friction law; names in problems are those of the law's fields
 
     def problems(self, states: Sequence[State]) -> Iterator[Problem]:
         """Yield Problems with forbidden combinations; `states` are those of the friction law, if it has several."""

@@ -116,7 +116,7 @@ class Generated:
 
 
 class _Sobol:
-    """Sobol sequence that continues from its last position; restarts only if an earlier part is requested."""
+    """Sobol sequence that continues where the last part ended; it restarts only if an earlier part is requested."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
         self.dimensions, self.seed = dimensions, seed

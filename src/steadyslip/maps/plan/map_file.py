@@ -102,7 +102,7 @@ class MapSettings(Settings):
                 yield Problem(one.name, f"has options but is not computed; add {one.name!r} to map.compute")
 
     def measures(self) -> list[Any] | None:
-        """Measures to compute, as records if they have options, else by name; None if the file has no `compute`."""
+        """Measures to compute, as records if they have options, else as names; None if the file has no `compute`."""
         if self.compute is None:
             return None
         with_options = {one.name: one for one in self.options}

@@ -16,7 +16,7 @@ from steadyslip.files.inputs import UnreadableFile, check_kind, check_room, insi
 from steadyslip.maps.plan.axes import COMPLETE
 
 METADATA = 2**26
-"""Largest size of a metadata file, bytes; chosen by trial, far above those of any map."""
+"""Largest size of a metadata file, bytes; chosen by trial, far above the metadata of any map."""
 _HEAD, _OVERHEAD = 16, 64  # bytes: length of Blosc's header, and upper bound of what codecs add to a chunk
 
 

@@ -46,7 +46,7 @@ Form = tuple[tuple[str, ...], tuple[int, ...], tuple[int, ...]]
 
 
 class LayoutError(ValueError):
-    """The metadata of a folder are not those of a map."""
+    """Error: the metadata of a folder are not those of a map."""
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ MOST_IN_ALL = 2 * 10**7  # largest number of values read, samples included: 160 
 MOST_SCATTERED = 5000  # largest number of points of a scatter plot; chosen by trial: more would overlap
 BAND = (0.025, 0.5, 0.975)  # quantiles of samples that are computed: ends of the 95 % band, and median
 FAILING = ("safety_factor", "margin")
-"""Results without a value at samples that are stable at all stiffnesses, or fail (stable at none, no sliding)."""
+"""Results that have no value for samples that are stable at all stiffnesses, stable at none, or do not slide."""
 
 
 @dataclass(frozen=True, eq=False)

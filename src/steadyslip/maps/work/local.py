@@ -19,7 +19,7 @@ from steadyslip.core.progress import interrupts_held
 from steadyslip.maps.work.chunk import Done, Job, do_chunk, reuse_memory
 
 PATIENCE = 8  # a run is given up if so many worker pools in a row die without a finished chunk; chosen by trial
-WATCH = 0.5  # s between a worker's checks that its parent is alive
+WATCH = 0.5  # s, time between a worker's checks that its parent is alive
 
 
 def run_here(job: Job, chunks: Sequence[int], report: Callable[[Done], None]) -> None:
@@ -104,7 +104,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
     A worker killed by Ctrl-C while it starts would leave the pool waiting for it.
     """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows: workers only ignore it once `_set_up_worker` has run
+    if not hasattr(signal, "pthread_sigmask"):  # Windows: workers ignore Ctrl-C only after `_set_up_worker` has run
         yield
         return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])

@@ -164,7 +164,7 @@ def sample_map(plant: Plant) -> Array:
 
 
 class _Move(NamedTuple):
-    """A gain or time of a controller, its present value (SI units), and the factor by which to change it repeatedly."""
+    """A gain or time of a controller: name, present value (SI units), and factor by which it is changed repeatedly."""
 
     name: str
     own: float

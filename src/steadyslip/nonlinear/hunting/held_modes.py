@@ -82,7 +82,7 @@ class HeldPiece:
 
     @cached_property
     def banded(self) -> Array:
-        """Row vector that gives the integrated error from the state: the error less the dead band, zero within it."""
+        """Row that gives the error that the controller integrates: zero within the dead band, else reduced by it."""
         band = self.plant.limits.dead_band
         if band is None:
             return self.plant.error()
@@ -123,7 +123,7 @@ class HeldPiece:
 
     @cached_property
     def pressing(self) -> tuple[list[tuple[Load, Array]], ...]:
-        """Loads of each contact as a list, each with the row of the normal stress that it adds."""
+        """List for each contact of its loads, each with the row that gives the normal stress which the load adds."""
         sides = iter(zip(self.mode.loads, self.pulls, strict=True))
         found = []
         for contact in self.plant.contacts:
@@ -218,7 +218,7 @@ class HeldPiece:
         found = []
         for i, (contact, way) in enumerate(zip(plant.contacts, self.mode.contacts, strict=True)):
             slip = plant.slip(contact)
-            if way:  # bristles: at half the speed, so that the contact does not switch to and fro
+            if way:  # bristles: the guard is at half the speed, so that the contact does not switch to and fro
                 found.append((way * slip - plant.row(one=0.5 * contact.slow), Switch("contact", i, 0)))
                 continue
             bound, row = (plant.row(one=contact.slow), slip) if contact.slow else (self.rest(i), self.resting[i])
@@ -226,7 +226,7 @@ class HeldPiece:
         return found
 
     def _of_loads(self) -> list[tuple[Array, Switch]]:
-        """Guards of the signs of loads, offset by `least_load`, so that a zero load does not switch to and fro."""
+        """Guards for the signs of loads; an offset of `least_load` keeps a zero load from switching to and fro."""
         least = self.plant.row(one=self.least_load)
         return [(to * pull + least, Switch("load", i, -to))
                 for i, (to, (_, pull)) in enumerate(zip(self.mode.loads, self.pulls, strict=True))]  # fmt: skip

@@ -33,7 +33,7 @@ IN_CORE = 2_000_000  # limit of steps of the compiled core: some ten seconds
 MOST_STEPS = 50_000  # limit of steps outside the compiled core, at switches of the mode
 OFTEN = 0.02  # repetition is tested again after this share of new strokes: a ringing drive makes thousands
 LONGEST = 1e9  # default end, s; the motion ends earlier by rest, repetition or the limits above
-CYCLES = 8  # largest number of strokes in a cycle that is looked for; usually it has two
+CYCLES = 8  # largest number of strokes of cycles that are looked for; a cycle usually has two strokes
 SHRINKING = 0.9  # strokes shrink if the ratio of later to earlier strokes is below this; chosen by trial
 
 
@@ -232,7 +232,7 @@ def _recent(strokes: Sequence[Stroke], count: int, shrinks: bool) -> Sequence[St
 
 
 def _scatter(strokes: Sequence[Stroke]) -> float:
-    """Largest difference (m or rad) between the ends of strokes in one direction."""
+    """Largest difference (m or rad) between the ends of strokes that have the same direction."""
     ends = [[one.ends for one in strokes if (one.ends > one.begins) is way] for way in (True, False)]
     return max(float(np.ptp(own)) for own in ends if own)
 

@@ -205,7 +205,7 @@ class Hunt(ReadOnly):
 
     @property
     def _so_far(self) -> str:
-        """Describe the motion so far of an axis that neither rests nor hunts at its end."""
+        """Text on the motion of an axis that, when the simulation ends, neither rests nor hunts."""
         own, now = self._swings, abs(float(self.error[-1])) if len(self.error) else 0.0
         off = f"is {format_quantity(now, self.unit)} from the target{self.at_body}"
         if not own:

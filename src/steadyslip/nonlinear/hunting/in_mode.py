@@ -14,7 +14,7 @@ from steadyslip.nonlinear.hunting.held_modes import HeldPiece
 from steadyslip.nonlinear.hunting.plant import Array, Plant
 from steadyslip.nonlinear.hunting.steps import passage
 
-AT_ONCE = 4096  # steps of one call of the core: some ten milliseconds
+AT_ONCE = 4096  # limit of steps in one call of the compiled core: some ten milliseconds
 NONE = np.zeros((0, 2)), np.zeros((0, 0, 0))  # step lengths and passage matrices of a new piece: none
 FEW = 0.25  # largest phase (rad) of the fastest mode between two recorded values
 

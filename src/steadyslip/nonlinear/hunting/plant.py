@@ -223,7 +223,7 @@ def _row(shares: Mapping[str, Any], names: list[str], target: bool = False) -> A
 
 
 def _controller(mechanism: Mechanism, names: list[str]) -> dict[str, Any]:
-    """Fields of `Plant` for the controller; each of its loops has an error, and gains on error and derivative."""
+    """Fields of `Plant` that describe the controller; each loop has an error, and gains on error and derivative."""
     active = [one for one in mechanism.elements if one.active]
     integral = mechanism.integral
     return {
@@ -269,7 +269,7 @@ NOT_AT_REST = "{}friction: the law {!r} is not offered at rest; allowed: coulomb
 
 
 def _pull_shares(contact: ContactLaw) -> tuple[float, float] | None:
-    """Normal stress per T > 0, and per −T for T < 0, that a contact law adds; None unless it is piecewise linear."""
+    """Normal stress that a contact law adds per T > 0, and per −T for T < 0; None if not piecewise linear in T."""
     letters: dict[str, Any] = {one.name: sp.Symbol(one.name) for one in fields(ContactInputs)}
     pull = sp.Symbol("pull", real=True)
     coupling = sp.sympify(contact.coupling(ContactInputs(**letters | {"spring": pull})))

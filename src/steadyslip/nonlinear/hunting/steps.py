@@ -91,7 +91,7 @@ def passage(piece: HeldPiece, watched: Array, length: float) -> Array:
 
 
 def first_crossing(guards: Array, fresh: Array, noise: Array) -> tuple[float, int] | None:
-    """Share of a step at which the first guard becomes negative, and its index; None if none does.
+    """Share of a step at which a guard first becomes negative, and the index of this guard; None if none does.
 
     Parameters
     ----------

@@ -118,7 +118,7 @@ class Motion:
     # -- the run
 
     def run(self) -> Iterator[Stroke | None]:
-        """Advance to the end of the target's segments, step by step; yield each stroke that ends, else None."""
+        """Advance to the end of the target's segments; after each step, yield the stroke that has ended, or None."""
         spans = zip(
             self.segments.end[0], self.segments.jump[0], self.segments.value[0, :, 0], self.segments.slope[0, :, 0],
             strict=True,
@@ -252,7 +252,7 @@ class Motion:
             worst = max(excess, key=excess.__getitem__, default=None)
             if worst is None or excess[worst] <= BEYOND:
                 return
-            self._stop(worst)  # its slip rate is zero only to within rounding
+            self._stop(worst)  # the slip rate of contact `worst` is zero only up to rounding
             self.mode = self.mode.switched(Switch("contact", worst, 1 if forces[worst] > 0 else -1))
             self.fresh |= {("contact", worst)}
 
@@ -278,7 +278,7 @@ class Motion:
     # -- recording
 
     def _stroke(self, moved: bool) -> Stroke | None:
-        """Begin or end a stroke if contacts have started or stopped to slide; returns the one that ended, or None."""
+        """Begin or end a stroke if contacts have started or stopped sliding; returns the stroke that ended, or None."""
         moves, strokes = any(self.mode.contacts), self.trace.strokes
         error = float(self.watched[0] @ self.state)
         if moves and not moved:
@@ -345,7 +345,7 @@ class Motion:
             return False
         if self.sampled:
             return True
-        winds_up = self.mode.limit * float(self._piece().wanted @ rates) > 0  # the force stays at its limit
+        winds_up = self.mode.limit * float(self._piece().wanted @ rates) > 0  # if so, the force stays at its limit
         return winds_up or bool(abs(rates[2 * n]) <= (self.still * self.farthest if moves else 0.0))
 
 

@@ -31,16 +31,17 @@ from steadyslip.nonlinear.kicks.threshold import edges
 from steadyslip.protocol import Protocol
 
 COARSE = 48  # number of kick sizes in the first scan of each rig
-WIDE = 0.1  # relative width of an undecided bracket above which the threshold is NaN, not its middle
+WIDE = 0.1  # if an undecided bracket is wider (relative), the threshold is NaN and not the middle of the bracket
 BEYOND = (*OUTCOMES[:UNDECIDED], *(f"undecided: {doubt}" for doubt in DOUBTS), "edge", "unstable", "no steady sliding",
           "out of range")  # fmt: skip
-"""Limits of the kicks of a rig: outcome of the smallest that fails (`RETURNS`: none fails), or reason without one."""
+"""What limits the kicks of a rig: outcome of the smallest kick that fails (`RETURNS` if none fails), or a reason.
+"""
 EDGE, UNSTABLE, ABSENT, BEYOND_FLOATS = range(len(BEYOND) - 4, len(BEYOND))
 
 
 @dataclass(frozen=True, eq=False)
 class Brackets:
-    """Thresholds of many rigs with brackets and limiting outcomes, arrays of one shape.
+    """Thresholds of many rigs, with their brackets and limiting outcomes, as arrays of equal shape.
 
     Attributes
     ----------
@@ -133,7 +134,10 @@ def threshold_map(
 
 
 def _axes(array: Any, rig: Slider | Machine, vary: Mapping[str, Any]) -> dict[str, dict[str, str]]:
-    """Attributes ``units`` and ``long_name`` of dimensions along which a parameter varies; present ones are kept."""
+    """Attributes ``units`` and ``long_name`` of the dimensions along which a parameter varies, by dimension.
+
+    Attributes that the DataArrays have already are kept.
+    """
     found = {}
     for given, values in vary.items():
         for dim in getattr(values, "dims", ()):

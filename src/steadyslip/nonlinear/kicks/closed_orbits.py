@@ -31,7 +31,7 @@ ATTRACTS = 1e-3  # smallest distance of multipliers from 1 that finite differenc
 WORTH = 0.1  # error of the trivial multiplier above which the other multipliers are not used
 ON = 0.05  # largest distance of the run from the orbit, as a share of the orbit's size
 PRECISE = 0.01  # allowed error of the orbit, as a share of its size
-AWAY = 1e-3  # distance from steady sliding, natural sizes, below which a closed orbit is not distinguished from it
+AWAY = 1e-3  # an orbit closer to steady sliding than this (natural sizes) is not distinguished from steady sliding
 DONE = STATUSES.index("done")
 
 

@@ -297,7 +297,7 @@ class Kicked:
         return contacts_of(runs, np.arange(len(which)), threads)
 
     def _jobs(self, which: Array) -> Jobs:
-        """Simulation jobs of the rigs with indices `which`, each of which starts in its steady sliding."""
+        """Simulation jobs of the rigs with indices `which`, which start in the rigs' steady sliding."""
         return replace(
             self.jobs, point=self.jobs.point.part(which), initial=picked(self.jobs.initial, which),
             velocity=picked(self.jobs.velocity, which), size=len(which),

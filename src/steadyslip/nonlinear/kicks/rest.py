@@ -154,7 +154,7 @@ class Rest:
 
 
 def picked(array: Any, which: Array) -> Any:
-    """Entries `which` of an array with one entry for each rig; the array itself if it has one entry for all."""
+    """Entries `which` of an array with one entry for each rig; the array itself if one entry is for all rigs."""
     return array[which] if np.ndim(array) and len(array) > 1 else array
 
 

@@ -47,7 +47,7 @@ class _Balance:
 
 @cached
 def _balance(reduction: Reduction) -> _Balance:
-    """Equation for the normal stress in steady sliding at v_lp and p, its slope, and the state there (cached)."""
+    """Compiled equation for the normal stress in steady sliding at v_lp and p, and compiled steady state (cached)."""
     model = reduction.model
     contact, zero = model.contact, sp.Integer(0)
     velocity = model.parameters["drive.velocity"]
@@ -146,7 +146,7 @@ def _stress(reduction: Reduction, point: OperatingPoint, velocity: Array, pressu
 
 
 def _machine_rest(jobs: Jobs, velocity: Array, force: Array, pressure: Array) -> Rest:
-    """Solve for a machine's steady sliding by Newton's method, in several steps of the inputs if one fails."""
+    """Solve for a machine's steady sliding by Newton's method; if this fails, in several steps of the inputs."""
     reduction, point, count = jobs.reduction, jobs.point, len(velocity)
     own, _ = natural_scales(point, reduction)
     drive = np.broadcast_to(np.asarray(point.drive, dtype=float), (count,))

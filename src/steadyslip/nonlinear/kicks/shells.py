@@ -181,7 +181,7 @@ class Shells:
         return np.asarray(np.sign(turned[:, 1, 0]))
 
     def _fate(self, one: int, radius: float) -> int:
-        """Common outcome of motions from the outer edge of a band, over one turn of phases; OPEN if they differ."""
+        """Common outcome of motions from the outer edge of a band, at all phases of a turn; OPEN if outcomes differ."""
         rest, near = self.runs.rest, self.runs.near
         turn = 2 * np.pi / np.abs(rest.leading[one : one + 1].imag)
         ray = near.basis[one][:, 0]

@@ -101,7 +101,7 @@ class MotionBatch:
     budget: StepBudget = field(default_factory=StepBudget)
 
     def repeated(self, one: int, count: int) -> MotionBatch:
-        """Batch of `count` motions of the rig of motion `one`, for any initial states."""
+        """Batch of `count` motions of the rig to which the motion of index `one` belongs, for any initial states."""
         which = np.full(count, one)
         rest, near = self.rest.part(which), self.near.part(which)
         nothing = np.zeros(count)

@@ -25,7 +25,8 @@ RIDGE = 1e-9
 """Added to the diagonal of the least-squares matrix, which is singular: a factor of all rows and its inverse of all
 columns cancel. Changes the scales by a share of about 1e-9."""
 EVEN_STEPS = 20
-"""Scalings of all rows and columns in turn; entries within a few decades of 1 then change by a few per cent at most."""
+"""Number of rounds in which rows, then columns are scaled: enough for entries within a few decades of 1, which one
+more round would change by a few per cent at most."""
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,11 @@ from steadyslip.nonlinear.onset.coefficient import even_scales
 
 DIGITS = 50  # decimal digits, three times those of double precision: products of three doubles are exact
 SETTLED = mpmath.mpf("1e-30")
-"""Relative Newton step at which the iteration stops: the next step would be smaller by the digits of the matrix."""
+"""Relative Newton step at which the iteration stops: the next step would be some nine decades smaller."""
 STEPS = 40
-"""Limit of Newton steps; each gains as many digits as the matrix has correct ones, so at one digit each 40 suffice."""
+"""Limit of Newton steps: enough if each step gains one digit; it gains as many as are correct in the matrix."""
 NOTHING = 1e-20
-"""c1 below this share of its error in double precision counts as zero; where it vanishes, fifty digits leave 1e-34."""
+"""c1 counts as zero below this share of its error in double precision; a vanishing c1 is computed as some 1e-34."""
 STEP = 1e-6
 """Relative step of the central differences for the Jacobian, which then has nine correct digits."""
 Numbers = list[Any]
@@ -176,7 +176,7 @@ class _Rig:
         return values, y[many + 1], [mpmath.mpc(a, b) for a, b in zip(parts[: self.n], parts[self.n :], strict=True)]
 
     def _residuals(self, arguments: Numbers, y: Numbers) -> Numbers:
-        """Residuals of steady sliding, of (G − iωM) q = 0 and of the amplitude, as many as unknowns."""
+        """Residuals of steady sliding, of (G − iωM) q = 0 and of the amplitude; there are as many as unknowns."""
         values, omega, q = self._split(arguments, y)
         found = self.linear(*values)
         rows = _times(self._entries(found), q, self.n)
@@ -265,7 +265,7 @@ class _Inverse:
         self.inverse = np.linalg.inv(self.rows[:, None] * matrix * self.columns)
 
     def refined(self, residuals: Callable[[Numbers], Numbers], start: Numbers) -> Numbers:
-        """Zero of the residuals near `start`, in fifty digits, by Newton steps with this inverse.
+        """Zero of the residuals near `start`, to fifty digits, found by Newton steps with this inverse matrix.
 
         Raises
         ------

@@ -300,7 +300,7 @@ def _followed(curve: SolutionCurve, start: Point, plane: _Plane, spacing: float)
 
 
 def _on_the_limit(curve: SolutionCurve, inside: Point, outside: Point, plane: _Plane) -> list[Point]:
-    """List of the point at which the curve leaves the range of a parameter; empty if it is not found."""
+    """List with the point at which the curve leaves the range of a parameter; empty if the point is not found."""
     values = [plane.parameters(p.u) for p in (inside, outside)]
     for i, (low, high) in enumerate(plane.limits):
         a, b = float(values[0][i]), float(values[1][i])

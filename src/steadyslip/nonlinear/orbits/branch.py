@@ -158,7 +158,7 @@ class CycleBranch(Displayed):
         return found.with_sentence(slip_sentence(self.rig, stable[-1], self.steady)) if stable else found
 
     def _between(self, low: Cycle, high: Cycle) -> str:
-        """Format the parameter values and periods of two neighbours, for a message on the cycle between them."""
+        """Text of the parameter values and periods of two neighbours, for a message on a missing cycle between them."""
         where = " and ".join(format_quantity(one.value, self.unit, 6, self._area("value")) for one in (low, high))
         periods = " and ".join(format_quantity(one.period, "s") for one in (low, high))
         return f"between {where}, of a period between {periods},"

@@ -52,7 +52,7 @@ class BranchPiece:
         return BranchPiece(self.points[::-1], special, self.end, self.whole, self.contact, self.stops, self.begins)
 
     def joined(self, more: BranchPiece) -> BranchPiece:
-        """Piece that joins the cycles of this one and those of `more`, which begins where this one ends."""
+        """Piece with the cycles of this piece followed by those of `more`, which begins where this piece ends."""
         count = len(self.points)
         special = [replace(one, index=one.index + count) for one in more.special]
         return BranchPiece(

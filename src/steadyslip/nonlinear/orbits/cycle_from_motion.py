@@ -323,7 +323,7 @@ class _Returns:
 
 
 def _enough(slips: _Returns, passes: _Returns, sticks: bool) -> bool:
-    """True if there are enough returns to compare: starts of slip events, or all passages if there are none.
+    """True if there are enough returns to compare: starts of slip events or, without slip events, passages.
 
     Ringing after a slip event passes the start of cycles too, but the motion returns only with the next event: once it
     had an event (`sticks`), passages alone suffice only if far more of them follow than a slip rings.

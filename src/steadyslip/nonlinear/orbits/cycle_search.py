@@ -74,7 +74,7 @@ def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle]) -> BranchPoint 
 
 
 def _add_piece(tracer: Tracer, pieces: list[BranchPiece], seed: BranchPoint, away: float) -> None:
-    """Follow the branch from a cycle both ways, and join the new piece to a known one that it meets, or append it."""
+    """Follow the branch from a cycle both ways; join the new piece to a known piece that it meets, or append it."""
     forth = seed if seed.point.tangent[-1] * away > 0 else replace(seed, point=turned_round(seed.point))
     back = replace(forth, point=turned_round(forth.point))
     step = 0.1 * LARGEST_STEP

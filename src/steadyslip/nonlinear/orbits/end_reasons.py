@@ -134,7 +134,7 @@ def is_damped(rig: Slider | Machine) -> bool:
 
 
 def winds(special: list[SpecialCycle]) -> bool:
-    """True if the last folds converge to one value while the period grows (Shilnikov)."""
+    """True if the last folds converge to one value of the parameter while the period grows (Shilnikov)."""
     folds = [point.cycle for point in special if point.kind == "fold"][-WINDINGS:]
     if len(folds) < WINDINGS:
         return False

@@ -47,7 +47,7 @@ KINDS_EACH = len(LOG_KINDS) - 2  # number of event kinds at one contact
 
 
 class FlowFailure(Failure):
-    """An integration that stopped before its end.
+    """Error: an integration stopped before its end.
 
     `status` is the reason, one of `steadyslip.motion.status.WORDS`; `contact` is the contact of a machine concerned.
     """
@@ -77,7 +77,7 @@ def _slip_shares(reduction: Reduction, contact: int) -> ArrayFunction:
 
 @dataclass(frozen=True, eq=False)
 class FlowSetting:
-    """A rig at one value of the free parameter, as kernels take it.
+    """A rig at one value of the free parameter, in the form that kernels need.
 
     Attributes
     ----------

@@ -326,7 +326,7 @@ def _close(tracer: Tracer, piece: BranchPiece, flip: Cycle) -> None:
 
 
 def _join(pieces: list[BranchPiece], piece: BranchPiece) -> None:
-    """Join a piece to the one of `pieces` that it has met, between two doublings."""
+    """Join a piece between two doublings to the piece in `pieces` that it has met."""
     meeting = piece.beyond or piece.points[-1]
     i = next(i for i, one in enumerate(pieces) if met([one], meeting))
     cut_back(pieces[i], meeting.cycle)

@@ -17,7 +17,7 @@ MET = 2e-3  # two cycles count as the same if the logarithms of period and veloc
 BLURRED = 10.0  # factor from the last Newton step to the uncertainty of the parameter; chosen by trial
 ROUNDING = 1e-11  # relative difference of parameter values that rounding explains anywhere on a branch
 FOLDED = 0.9  # a fold is rejected if all multipliers are smaller than this: at a true fold, one multiplier is 1
-REAL = 1e-3  # relative imaginary part below which a multiplier counts as real: errors split a double real one by it
+REAL = 1e-3  # a multiplier with a smaller relative imaginary part is real: errors split a double real multiplier so far
 SMALL = 1e-2  # for a smaller amplitude of ln v, the kind of onset decides stability if a multiplier is 1 up to rounding
 
 

@@ -19,18 +19,19 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 from steadyslip.protocol.protocol import LOAD_POINT
 
-_RIGID = 1e3  # a spring behind the sensor is negligible from this multiple of the machine's stiffness
+_RIGID = 1e3  # a spring behind the sensor is negligible if its stiffness exceeds this multiple of the machine's
 PART_OF_PRESS = 5.0
-"""A sensor is across the fault if the spring behind it is less stiff than this multiple of the machine. Springs found
-for sensors across the fault were .8 to 2 times as stiff; two that were due to noise were 8 and 32 times as stiff."""
+"""A sensor is across the fault if the spring between it and the load point is less stiff than this multiple of the
+machine. For sensors across the fault, springs 0.8 to 2 times as stiff as the machine were found; two springs that noise
+had caused were 8 and 32 times as stiff."""
 USUAL_DISTANCES = (1e-7, 2e-3)  # slip distances (m) found in laboratories, from polished surfaces to thick gouge
-USUAL_EFFECT = 0.2  # sizes of a and b found in laboratories are below .1, of polymers and ice too
-OTHER_UNIT = 20.0  # ratio to the calibrated stiffness from which a unit is wrong: lags and servos change it by 2
-CALIBRATED = 0.1  # smaller relative differences from a calibration are not reported: calibrations are no better
-WAVY = 4.0  # waves are reported if a displacement wanders by this multiple of its sample-to-sample noise
+USUAL_EFFECT = 0.2  # larger sizes of a and b are reported; in laboratories they are below 0.1, even of polymers and ice
+OTHER_UNIT = 20.0  # if fitted and calibrated stiffness differ by this factor, a unit is wrong: a servo makes a factor 2
+CALIBRATED = 0.1  # smaller relative differences from a calibration are not reported, as calibrations err by as much
+WAVY = 4.0  # waves are reported if a displacement deviates from lines by this multiple of its sample-to-sample noise
 MOST_FAULTS = 10  # waves are also reported above this number of slips and glitches; real records had up to 5
-SHOWN = 25.0  # rise of -2 log likelihood without a change of rate from which friction shows it: five standard errors
-LISTED = 4  # most changes listed in a warning
+SHOWN = 25.0  # a change of rate is real if -2 log likelihood rises by this much without it: five standard errors
+LISTED = 4  # largest number of changes listed in a warning
 
 
 def loading_warnings(fit: FitNumbers) -> list[str]:
@@ -67,7 +68,7 @@ def _loading_outliers(fit: FitNumbers) -> list[str]:
 
 
 def _assumed_rate(fit: FitNumbers) -> list[str]:
-    """Warning that no displacement confirms the rate before the first change of a protocol."""
+    """Warning that no measured displacement confirms the rate before the first change of a protocol."""
     if fit.plan.protocol is None or any(record.displacement is not None for record in fit.plan.records):
         return []
     return [
@@ -87,7 +88,7 @@ def _against_protocol(fit: FitNumbers) -> list[str]:
 
 
 def _across_fault(fit: FitNumbers) -> list[str]:
-    """Warnings on displacements that move with friction, which are not those of the load point."""
+    """Warnings on displacements that vary with friction, so that they are not those of the load point."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
         if record.displacement is None or record.integrated or loading.load is None:
@@ -114,7 +115,7 @@ def _across_fault(fit: FitNumbers) -> list[str]:
 
 
 def _waves(fit: FitNumbers) -> list[str]:
-    """Warnings on displacements that deviate from straight lines by much more than noise, also slow noise, explains."""
+    """Warnings on displacements whose deviations from straight lines are much larger than noise, even slow noise."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading if fit.plan.follows else (), strict=False):
         found += [
@@ -165,7 +166,7 @@ def _small_changes(fit: FitNumbers) -> list[str]:
 
 
 def _shown_by_friction(fit: FitNumbers, record: int, change: int) -> bool:
-    """True if friction is followed much worse by the fit without a change of rate: the load point made it."""
+    """True if friction is fitted much worse without a change of rate, so that the load point did change its rate."""
     load, part = fit.plan.loading[record].load, fit.comparison.parts[record]
     if not fit.plan.follows or load is None:
         return False
@@ -182,12 +183,12 @@ def _shown_by_friction(fit: FitNumbers, record: int, change: int) -> bool:
 
 
 def _stiffness(rig: Slider) -> float:
-    """Stiffness (Pa/m) that loads the fault: of the machine, and of a controller."""
+    """Stiffness (Pa/m) that loads the fault: the stiffness of the machine plus that of a proportional controller."""
     return float(operating_point(rig).named()["slider.stiffness"]) + float(rig.drive.proportional())
 
 
 def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
-    """Warning if the noise of the displacement moves the model by 0.3 of the residuals' rms or more; else None."""
+    """Warning if noise of the displacement changes the model by 0.3 of the root mean square residual or more."""
     record = part.record
     if record.integrated or record.displacement is None:
         return None
@@ -206,7 +207,7 @@ def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
 
 
 def _off_calibration(fit: FitNumbers) -> list[str]:
-    """Warnings on a fitted stiffness that differs from the calibrated one by more than their uncertainty."""
+    """Warnings on a fitted stiffness that differs from the calibrated stiffness by more than their uncertainty."""
     far = [
         one for one in fit.derived
         if one.name.startswith("k/k_cal") and not (one.low <= 1 <= one.high) and abs(one.value - 1) > CALIBRATED
@@ -226,7 +227,7 @@ def _off_calibration(fit: FitNumbers) -> list[str]:
 
 
 def _unusual_values(fit: FitNumbers) -> list[str]:
-    """Warnings on slip distances, and on effects of velocity and state, that are beyond what laboratories find."""
+    """Warnings on slip distances, and on sizes of a and b, that are outside the range found in laboratories."""
     found = []
     low, high = USUAL_DISTANCES
     odd = [
@@ -255,7 +256,7 @@ def _unusual_values(fit: FitNumbers) -> list[str]:
 
 
 def _fitted_of_kind(fit: FitNumbers, kind: str) -> list[tuple[str, float]]:
-    """Names and values of the fitted parameters of a kind."""
+    """Names and values of the fitted parameters that are of the kind `kind`."""
     own = fit.plan.rig.of_kind(kind)
     return [(name, size) for name, size in fit.values.items() if name.partition("@")[0] in own]
 

@@ -1,8 +1,8 @@
-"""Search for memories of normal stress that fit as well as none: parameters that they change are not determined.
+"""Search for memories of normal stress that fit as well as no memory: parameters that they change are not determined.
 
 The response to a step of normal stress depends on the memory (α) together with a, b, d_c and the stiffness. A law
-without a memory assumes α = 0 and gives small errors of the others, which hold only if α is 0. Another evolution law
-may need a memory where this one needs none.
+without a memory assumes α = 0 and gives small errors of the other parameters, which hold only if α is 0. With another
+evolution law, a memory may be needed although the law of the fit needs none.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from steadyslip.experiments.fitting.search import ROUGH_PATIENCE
 from steadyslip.experiments.fitting.starts import features_of, search_bounds
 from steadyslip.experiments.numerics.least_squares import LOST, Minima, minimise
 
-SIZES = (0.5, 1.0, 1.5, 2.5)  # sizes of a memory that are tried, in natural sizes: α .1 to .5, as in laboratories
+SIZES = (0.5, 1.0, 1.5, 2.5)  # multiples of the typical α = 0.2 that are tried: 0.1 to 0.5, as in laboratories
 
 
 @dataclass(frozen=True, eq=False)
 class Rival(EqualMinimum):
-    """Fit with a memory of normal stress of a given size, which is as good as without a memory.
+    """Fit with a memory of normal stress that is as good as the fit without a memory.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Rival(EqualMinimum):
 
 
 def forgets_changes(plan: Plan) -> bool:
-    """True if the normal stress changes in a record, drives the contact, and the law has no memory of it."""
+    """True if the normal stress changes in a record and drives the contact, but the law has no memory of it."""
     changes = any(record.stress_changes for record in plan.records)
     return changes and plan.pressed and bool(plan.rig.friction.forgets_stress())
 
@@ -47,9 +47,10 @@ def forgets_changes(plan: Plan) -> bool:
 def equal_memories(
     plan: Plan, ssq: float, values: Mapping[str, float], deviations: Array, independent: float
 ) -> list[Rival]:
-    """Fits with another memory of normal stress, of several sizes, that are as good and change values beyond errors.
+    """Fits with another memory of normal stress that are as good and change parameters by more than their errors.
 
-    They are searched for laws without a memory; for laws with a memory only if nothing but the normal stress changes.
+    Such fits are searched for laws without a memory; for laws with a memory only if nothing but the normal stress
+    changes. Several sizes of the memory are tried.
 
     Parameters
     ----------
@@ -57,11 +58,11 @@ def equal_memories(
     ssq : float
         Sum of squares of the fit of the plan.
     values : mapping of str to float
-        Values of that fit, by name of the unknown.
+        Fitted values, by name of the unknown.
     deviations : ndarray (p,)
-        Standard deviations of the coordinates of that fit.
+        Standard deviations of the fitted coordinates.
     independent : float
-        Number of independent samples in the residuals of that fit.
+        Number of independent samples in the residuals of the fit.
     """
     if not (forgets_changes(plan) or stress_alone(plan)):
         return []
@@ -71,7 +72,7 @@ def equal_memories(
     laws = [plan.rig.friction]
     for form in ((), *others):  # the evolution law of the plan first
         if found and max(one.remedy.gain for one in found) < STRONG_EVIDENCE:
-            break  # the memory is open
+            break  # the records do not determine the memory
         new = [own for own in _with_memory(plan, form) if own.rig.friction not in laws]
         laws += [own.rig.friction for own in new]
         near = [one for own in new for one in _rivals(plan, own, ssq, values, most)]
@@ -80,7 +81,7 @@ def equal_memories(
 
 
 def _with_memory(plan: Plan, form: Sequence[str]) -> Iterator[Plan]:
-    """Plans with each memory of normal stress; `form` names an evolution law (empty: that of the plan)."""
+    """Plans with each memory of normal stress, and with the evolution law that `form` names (if empty, the plan's)."""
     for words in product(*plan.rig.friction.decided_by_stress.values()):
         own = with_words(plan, [*form, *words])
         if not own.rig.friction.forgets_stress():
@@ -88,7 +89,7 @@ def _with_memory(plan: Plan, form: Sequence[str]) -> Iterator[Plan]:
 
 
 def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float], most: float) -> Iterator[Rival]:
-    """Fits of a plan `own` with a memory, started at the fit without; searches that cannot reach `most` end early."""
+    """Fits of `own`, a plan with a memory, from the fit of `plan`; searches that cannot reach `most` end early."""
     space, addresses = own.space(), own.rig.parameters()
     remembers = tuple(f"friction.{field}." for field in own.rig.friction.decided_by_stress)
     here, idle, tried = (np.zeros(len(space)) for _ in range(3))
@@ -113,7 +114,7 @@ def _rivals(plan: Plan, own: Plan, ssq: float, values: Mapping[str, float], most
     if most < np.min(ends.ssq) < LOST * most:  # the best size may lie between two sizes
         ends = minima(ends.sorted().coordinates[:1], None)
         if np.any(np.abs(ends.coordinates[0] - idle)[tried != 0] < SIZES[0]):
-            return  # hardly any memory, within noise of none
+            return  # the best fit has hardly any memory
     instant = np.any(distances & (ends.coordinates <= low), axis=1)  # decays before the next sample: no memory
     for z in ends.coordinates[(ends.ssq < most) & ~instant]:
         yield Rival(space, z - here, remedy(plan, own, comparison, z, ssq, len(plan.space())))

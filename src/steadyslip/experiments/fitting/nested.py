@@ -1,8 +1,8 @@
-"""Models nested in the model of a fit, whose sum of squares must not be larger than theirs.
+"""Models nested in the model of a fit; the fit must not have a larger sum of squares than any of them.
 
-A parameter may declare a value at which it has no effect (`Parameter.idle`); the model without it is then a special
-case of the model with it. If such a nested model comes near the best fit, it is fitted too, exactly as in a separate
-fit, and the richer model starts from its minimum.
+A parameter may declare a value at which it has no effect (`Parameter.idle`). The model without this parameter is then a
+special case of, or nested in, the model with it. If a nested model comes near the best fit, it is fitted too, exactly
+as in a separate fit, and the model of the fit starts from its minimum.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.machine.slider import Slider
 
-SCALE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # multiples of a similar scale at which an undetermined scale starts
+SCALE_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # an undetermined scale starts at these multiples of a similar scale
 
 
 @dataclass(frozen=True)
 class NestedModel:
-    """Nested model, with the further parameters of the richer model.
+    """Nested model, and the further parameters of the richer model in which it is nested.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class NestedModel:
         return held, at
 
     def points_in(self, space: Space, coordinates: Array, low: Array, high: Array) -> Array:
-        """Points (m, p) of the richer model for coordinates of the nested one, with m values of undetermined scales."""
+        """Points (m, p) of the richer model for coordinates of the nested model and m values of undetermined scales."""
         known = dict(zip([one.name for one in self.plan.space().unknowns], coordinates, strict=True))
         _, at = self.missing(space)
         own = np.array([known.get(one.name, at[i]) for i, one in enumerate(space.unknowns)])
@@ -61,7 +61,7 @@ class NestedModel:
 
 
 def nested_models(plan: Plan) -> Iterator[NestedModel]:
-    """Models without the last trend term, the free initial state, the offset, the last state, or a part of the law."""
+    """Models that each lack one thing: last trend term, free initial state, offset, last state, or part of the law."""
     if plan.trend:
         yield NestedModel(replace(plan, trend=plan.trend - 1), {f"trend.{plan.trend}": 0.0}, ())
     if plan.initial == "free":

@@ -32,8 +32,8 @@ from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.noise import STRUCTURE
 from steadyslip.machine.slider import Slider
 
-BEYOND = 3.0  # standard errors by which a fitted time of a change may lie outside its window
-SIGNIFICANT_GAIN = 9.0  # decrease of the sum of squares that is significant, in variances of one sample: three σ
+BEYOND = 3.0  # an unbounded fit may move the time of a change out of its window by up to this many standard errors
+SIGNIFICANT_GAIN = 9.0  # a larger decrease of the sum of squares, in variances of a sample, is significant: three σ
 DIFFERENCE = re.compile(r"^\s*(a\s*[-−]\s*b|b\s*[-−]\s*a)(?=@|\s*$)")  # a minus the sum of all b, or its negative
 
 
@@ -65,7 +65,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return low, high
 
     def _derived(self, name: str) -> Estimate | None:
-        """Derived quantity of a name; None if no derived quantity has this name."""
+        """Derived quantity with a name; None if no derived quantity has this name."""
         found = DIFFERENCE.sub("a - b", name)
         own = (
             next((one for one in self.derived if one.name == found), None)
@@ -78,7 +78,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residuals, in friction."""
+        """Root mean square of the residuals (friction coefficient, not weighted)."""
         return float(np.sqrt(np.mean(self.residuals**2)))
 
     @property
@@ -100,23 +100,23 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
 
     @cached_property
     def as_measured(self) -> dict[str, float] | None:
-        """Values of a fit driven by the measured columns instead of the commanded loading, by name.
+        """Values, by name, of a fit driven by the measured columns instead of the commanded loading.
 
-        None if the model does not follow commanded loading, the measured columns have hardly any noise, or the search
-        was stopped before it ended.
+        They are None if the loading of the fit is not commanded, the measured columns have hardly any noise, or the
+        search was stopped before it ended.
         """
         return None if not self.search.converged else driven_as_measured(self.plan, self.values, self._ends)
 
     @cached_property
     def as_ramps(self) -> tuple[RampFit, ...]:
-        """Fits with ramps in place of velocity steps that the displacement does not distinguish from ramps."""
+        """Fits in which ramps replace the velocity steps that the displacement does not distinguish from ramps."""
         return with_ramps(self.plan, self.values, self._ends, self.ssq * self.nearly)
 
     @cached_property
     def remedies(self) -> tuple[Remedy, ...]:
-        """Short fits with other laws, a lag or a trend, best first, if residuals have structure or one is better.
+        """Short fits with other laws, a lag or a trend, if residuals have structure or a fit is better; the best first.
 
-        Otherwise, if the normal stress changes, short fits with memories of it that are as good as without a memory.
+        Otherwise, if the normal stress changes, short fits with a memory of it that are as good as without a memory.
         """
         forgets = forgets_changes(self.plan)
         if self.whiteness.p < STRUCTURE or (
@@ -134,9 +134,9 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return replace(self, joint=self._joint(replace(self._minimum, covariance=covariance), self.covariance, near))
 
     def _joint(self, minimum: Minimum, covariance: Array, near: Array) -> dict[str, float]:
-        """Errors, at `minimum`, of derived quantities of parameters that are undetermined in a covariance (p, p).
+        """Errors, at `minimum`, of derived quantities that depend on parameters undetermined in a covariance (p, p).
 
-        There are none if no rate changes: only friction at two rates determines a - b without a and b.
+        The result is empty if no rate changes: only friction at two rates determines a - b without a and b.
         """
         rigs, lost = [part.rig for part in self.comparison.parts], replace(minimum, covariance=covariance).lost
         if stress_alone(self.plan):
@@ -148,7 +148,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         """Fit with larger errors of parameters that change if a memory of normal stress is added that fits as well.
 
         Parameters that change much become undetermined. If another memory, or another law with a memory, fits better,
-        the fit is unchanged and `remedies` contains it, as for residuals with structure.
+        this fit is unchanged and `remedies` contains the better model, as for residuals with structure.
         """
         if self.plan.trend and self.search.converged:
             return self._without_weakening()
@@ -174,9 +174,9 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return same
 
     def _without_weakening(self) -> Self:
-        """Fit without errors of b and a - b, if a second state of long slip distance fits as well as its trend.
+        """Fit without errors of b and a - b, if a second state of long slip distance fits as well as the fit's trend.
 
-        If residuals have structure, neither is right, and only a state that fits better by strong evidence counts.
+        If residuals have structure, neither model is right, and the state must fit better by strong evidence.
         """
         slow = slow_state(self.plan, self.ssq, self.plan, self.values)
         noise = self.whiteness.p >= STRUCTURE
@@ -191,7 +191,7 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         return same
 
     def with_variants(self) -> Self:
-        """Fit with the short refits for its text computed, so that printing it is quick."""
+        """This fit, after the short refits for its text have been computed, so that it is printed quickly."""
         _ = self.as_measured, self.as_ramps, self.remedies
         return self
 
@@ -237,13 +237,13 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         if not (self.plan.follows and one.parameter.startswith("step.") and one.parameter.endswith(".at")):
             return True
         deviation = float(np.sqrt(self.covariance[which, which]))
-        if self.whiteness.p < STRUCTURE:  # the model may be wrong: then each time at a bound is a sign of it
+        if self.whiteness.p < STRUCTURE:  # the model may be wrong, and every time at a bound is a sign of this
             return True
         return not np.isfinite(deviation) or abs(float(self._released[which])) > BEYOND * deviation
 
     @cached_property
     def _released(self) -> Array:
-        """Gauss-Newton step (p,) from the minimum without bounds, in coordinates."""
+        """Gauss-Newton step (p,) from the minimum, in coordinates, computed as if there were no bounds."""
         residuals, jacobian = (own[0] for own in self.comparison.residuals(self.coordinates[None]))
         return np.asarray(np.linalg.lstsq(jacobian @ jacobian.T, -jacobian @ residuals)[0])
 

@@ -39,7 +39,7 @@ from steadyslip.model.scales import memory_scales
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
 
-FRICTION_SIZE = 0.01  # natural size of an initial difference of friction from steady sliding
+FRICTION_SIZE = 0.01  # typical initial difference of friction from steady sliding, the unit of its coordinate
 TRIAL_RTOL = 1e-6  # tolerance of a step in trial fits: about 1e-8 of friction, far below the scatter of any record
 
 
@@ -57,8 +57,8 @@ class Plan:
     separate : tuple of str
         Free parameters that have a separate value in every record.
     drive : str
-        Loading of the model: ``commanded`` (found in the record), its displacement ``smoothed`` or as ``measured``, or
-        the ``protocol``.
+        Loading of the model: ``commanded`` (found in the record), ``smoothed`` (a smooth curve through the measured
+        displacement), ``measured`` (the measured columns) or ``protocol``.
     protocol : Protocol or None
         Protocol with times on the records' clock.
     trend : int
@@ -115,7 +115,7 @@ class Plan:
 
     @property
     def pressed(self) -> bool:
-        """True if the contact's normal stress is imposed, so that the measured one drives the model."""
+        """True if the contact's normal stress is imposed, so that the measured normal stress drives the model."""
         return self.rig.contact.is_imposed() or self.rig.contact.has_pores()
 
     def space(self) -> Space:
@@ -142,7 +142,7 @@ class Plan:
         return replace(self, rtol=max(self.rtol, TRIAL_RTOL))
 
     def beginning(self, i: int) -> Beginning:
-        """Known initial difference of record `i` from steady sliding, for the memories of the law; empty if unknown."""
+        """Known initial difference of record `i` from steady sliding, for memories of the law; empty if unknown."""
         return self.beginnings[i].of(self.initial_sizes) if self.beginnings else Beginning({})
 
     def rests(self, i: int) -> bool:
@@ -151,7 +151,7 @@ class Plan:
 
     @cached_property
     def initial_sizes(self) -> dict[str, float]:
-        """Natural sizes of the initial differences from steady sliding: 0.01 of friction, an e-fold of each state."""
+        """Typical sizes, by name, of initial differences from steady sliding: 0.01 of friction, 1 of ln(state)."""
         point = operating_point(self.rig, {})
         program = experiment_program(point.model, 0, "tsit5", settled=False)
         scales = memory_scales(point)
@@ -166,7 +166,7 @@ class Plan:
         return unknown(self.rig.parameters()[name], record)
 
     def comparison(self, effort: Effort | None = None, given: Collection[str] = ()) -> Comparison:
-        """Comparison of the records with the compiled model; without derivatives by the durations named in `given`."""
+        """Comparison of the records with the compiled model, which has no derivatives by the durations in `given`."""
         space, effort = self.space(), effort or Effort()
         parts = tuple(self._part(i, record, space, effort, given) for i, record in enumerate(self.records))
         return Comparison(parts, space, self.loss, self.width or 1.0)
@@ -246,7 +246,7 @@ def _pressed_with(rig: Slider, stress: float) -> Slider:
 
 
 def with_loading(plan: Plan) -> Plan:
-    """Plan with the loading of its records, which is found now because thinned records do not show it."""
+    """Plan with the loading of its records; it must be found before records are reduced to few samples."""
     if plan.drive == "measured":
         drivers = (record if plan.pressed else replace(record, normal=None) for record in plan.records)
         return replace(plan, sharp=tuple(sharp_changes(driver) for driver in drivers), loading=())
@@ -261,5 +261,5 @@ def with_loading(plan: Plan) -> Plan:
 
 
 def with_lag(plan: Plan) -> Plan:
-    """Plan in which friction may lag its loading; in each record, one change has a known time as reference."""
+    """Plan in which friction may lag its loading; in each record the time of one change is known, as a reference."""
     return replace(plan, lag=True, loading=tuple(map(with_reference, plan.loading)))

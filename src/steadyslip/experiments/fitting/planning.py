@@ -1,6 +1,6 @@
-"""Plan of a fit from the user's arguments; one error lists everything that is wrong with them.
+"""Plan of a fit from the user's arguments; a single error lists everything that is wrong with them.
 
-Records are checked before the search; errors say what to change.
+Records are checked before the search, and errors say what to change.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import LOAD_POINT
 
 MAX_SAMPLES, AVERAGED_SAMPLES = 40_000, 8_000
-"""A record with more samples is averaged to about this number of means, to save time; chosen by trial."""
+"""A record with more samples than the first number is averaged to about the second number of means, to save time; by
+trial."""
 NEVER_FREE = ("drive.velocity", "slider.area")
 
 
@@ -98,7 +99,7 @@ def make_plan(
 
 
 def _driven_as_recorded(rig: Slider, records: Sequence[Record]) -> Slider:
-    """Rig whose drive velocity, if it is a placeholder, is replaced by that of the first record that has one."""
+    """Rig whose drive velocity, if it is a placeholder, is the initial rate of the first record that has a rate."""
     if not isinstance(rig.drive.velocity, Placeholder):
         return rig
     rate = next((rate for record in records if (rate := record.initial_rate or 0.0) > 0), None)
@@ -112,7 +113,7 @@ def _driven_as_recorded(rig: Slider, records: Sequence[Record]) -> Slider:
 
 
 def can_be_free(rig: Slider, protocol: Protocol | None = None) -> dict[str, Address]:
-    """Parameters that may be free, by dotted name: those that have a value and an effect."""
+    """Parameters that may be free, by dotted name: they have a value, and an effect on the motion."""
     found = {
         name: a for name, a in rig.parameters().items()
         if a.value is not None and name not in NEVER_FREE and not a.role.gauge
@@ -124,14 +125,14 @@ def can_be_free(rig: Slider, protocol: Protocol | None = None) -> dict[str, Addr
 
 
 def _default_free(rig: Slider) -> list[str]:
-    """Names that are free by default: parameters of the friction law, drainage and stiffness."""
+    """Names of the parameters that are free by default: those of the friction law, drainage and stiffness."""
     drains = rig.of_kind("drainage")
     found = [name for name in can_be_free(rig) if name.startswith("friction.") or name in drains]
     return [*found, "slider.axial_stiffness" if rig.axial_stiffness is not None else "slider.stiffness"]
 
 
 def resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> list[str]:
-    """Full names, as in `known`, of parameters; adds a problem on the option `what` for each unknown name."""
+    """Full names, as in `known`, of the parameters `names`; for an unknown name, a problem with `what` is added."""
     if isinstance(names, str):
         names = [names]
     found = []
@@ -147,7 +148,7 @@ def resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> list
 
 
 def _averaged(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Array, ...] | None]:
-    """Records, of which long ones are averaged, and weights of their samples (None if no sample is a mean)."""
+    """Records, the long ones averaged to fewer samples, and weights of samples (None if no sample is a mean)."""
     handy = tuple(r if len(r) <= MAX_SAMPLES else r.decimated(AVERAGED_SAMPLES) for r in records)
     if all(record.worth is None for record in handy):
         return handy, None
@@ -233,7 +234,7 @@ def check_records(plan: Plan) -> None:
 
 
 def check_changes(plan: Plan) -> None:
-    """Raise ParameterError if no record has a change of loading: undisturbed steady sliding gives constant friction."""
+    """Raise ParameterError if no loading changes in any record: friction of steady sliding is constant."""
     asked = [name for name in plan.free if name not in plan.rig.of_kind("friction level")]
     if not (asked and plan.follows and plan.initial == "steady"):
         return

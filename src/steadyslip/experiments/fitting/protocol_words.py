@@ -14,18 +14,18 @@ from steadyslip.experiments.loading.across import yielding
 from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.numerics.splitting import displacement_noise, line, spread
 
-RATE_SHARE = 0.02  # least relative difference of rates that is reported: calibrations agree to a percent or so
+RATE_SHARE = 0.02  # smaller relative differences of rates are not reported: calibrations agree to about one percent
 BEYOND = 5.0  # a difference of more standard deviations is not noise of the sensor
-FEWEST = 8  # least number of samples that show a rate
-SETTLED = 0.3  # share of the time at a rate that is ignored at first, while a servo settles
+FEWEST = 8  # least number of samples from which a rate is computed
+SETTLED = 0.3  # first share of the time at a rate that is ignored, as a servo may still be settling
 
 
 @dataclass(frozen=True)
 class _Stretch:
     """Part of a protocol at one rate, with a straight line through the measured minus the commanded displacement.
 
-    `count` is the number of settled samples; `offset` (m) and `excess` (m/s) are the mean and the slope of the line,
-    `noise` (m) is the scatter about it.
+    `count` is the number of samples on the line; `offset` (m) and `excess` (m/s) are its mean and its slope, `noise`
+    (m) is the scatter about it.
     """
 
     begin: float
@@ -39,7 +39,7 @@ class _Stretch:
 
 
 def protocol_against_record(part: Any, times: Array) -> str:
-    """Sentence on where a protocol contradicts the measured displacement of a record; empty if nowhere.
+    """Sentence that says where a protocol contradicts the measured displacement of a record; empty if they agree.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def protocol_against_record(part: Any, times: Array) -> str:
         )
     course = record.loading.load
     if course is not None and yielding(record.time, record.displacement, record.friction, course) is not None:
-        return ""  # measured across the fault: it does not show when the load point moved
+        return ""  # a displacement across the fault does not show when the load point changed its rate
     return _late(record.source, stretches, course)
 
 

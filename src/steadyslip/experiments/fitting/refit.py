@@ -1,4 +1,4 @@
-"""Variants of a fit: minima for other assumptions about the loading."""
+"""Variants of a fit: minima under other assumptions about the loading."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class RampFit:
 def driven_as_measured(
     plan: Plan, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, float] | None:
-    """Values, by name, at the minimum near that of a fit if measured columns drive the model; None if there is none.
+    """Values, by name, of a fit in which measured columns drive the model, searched from a fit's minimum; or None.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def driven_as_measured(
 
 
 def _minimised(plan: Plan, z: Array, low: Array, high: Array, given: Collection[str] = (), **options: Any) -> Minima:
-    """Minima from starting points z (m, p) with held durations named in `given`, within the work of one search."""
+    """Minima from starting points `z` (m, p), with the durations in `given` fixed, within the work of one search."""
     samples = sum(len(record) for record in plan.records)
     allowance = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
     comparison = plan.for_trial().comparison(Effort(budget=budget), given)
@@ -82,9 +82,9 @@ def with_ramps(
 ) -> tuple[RampFit, ...]:
     """Minima with ramps in place of steps that may be ramps, the shortest ramps first; empty if there are none.
 
-    Parameters are those of `driven_as_measured`, and the sum of squares `wanted`: searches that will not reach it end
-    early. Several durations are tried, as shares of the longest possible ones; the middle of a ramp stays within the
-    window of the step.
+    Parameters are those of `driven_as_measured`, and `wanted`: searches that will not reach this sum of squares end
+    early. Several durations are tried, as shares of the longest possible durations; the middle of a ramp stays within
+    the window of the step.
     """
     if not plan.follows or not any(may_be_ramp(c, change) for one in plan.loading for c, _, change in one.changes):
         return ()
@@ -94,7 +94,7 @@ def with_ramps(
     lows, highs = (np.tile(ends, (len(RAMP_SHARES), 1)) for ends in (low, high))
     begin = np.array([[values.get(u.name, share * u.high) for u in space.unknowns] for share in RAMP_SHARES])
     lengths = [k for k, u in enumerate(space.unknowns) if u.name not in values]
-    for k in lengths:  # the unknown before a duration is the begin of the ramp
+    for k in lengths:  # the unknown just before a duration is the time at which the ramp begins
         earlier = 0.5 * begin[:, k : k + 1]
         begin[:, k - 1 : k] -= earlier
         for ends in (lows, highs):
@@ -104,7 +104,7 @@ def with_ramps(
     z = space.coordinates(begin)
     lows[:, lengths], highs[:, lengths] = z[:, lengths], z[:, lengths]
     near = {"damping": DAMPING_NEAR, "known": wanted}
-    # with a larger tolerance searches end along flat valleys
+    # with a larger tolerance, searches would end too early in flat valleys
     given = [space.unknowns[k].name for k in lengths]
     found = _minimised(plan, z, lows, highs, given, most=40, held=held, tolerance=1e-8, **near)
     names, own = [u.name for u in space.unknowns], space.values(found.coordinates)

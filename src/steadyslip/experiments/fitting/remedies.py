@@ -26,23 +26,23 @@ from steadyslip.experiments.numerics.noise import STRUCTURE, describe, whiteness
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.slider import Slider
 
-STRONG_EVIDENCE = 6.0  # difference of BIC that counts as strong evidence (Kass & Raftery 1995)
-ROUNDS = 2  # number of changes that are tried on top of each other
+STRONG_EVIDENCE = 6.0  # a larger difference of BIC counts as strong evidence (Kass & Raftery 1995)
+ROUNDS = 2  # number of changes of a model that are tried together
 TRIAL_EFFORT, TRIAL_STARTS = 0.02, 3
 """Effort and starts of each trial; for simulated records they lead to the same minima as the default values."""
 MEMORY_EFFORT = 0.1
 """Effort of trials with a memory of normal stress that the law lacks. On a record with one step of the stress, trials
-with .02 ended at a minimum of .68 of the sum of squares instead of .42."""
+with an effort of 0.02 reduced the sum of squares only to 0.68 of its value, instead of 0.42."""
 MAX_TREND = 2  # highest order of a trend that is tried
-SMALL_FALL = 0.1  # tolerance of a short search, as decrease of −2 log likelihood for white noise: without effect
+SMALL_FALL = 0.1  # a short search ends if −2 log likelihood (white noise) falls by less: too little to matter
 
 SLOWER = np.geomspace(3.0, 300.0, 8)  # slip distances of a second state that are tried, as multiples of the first
 TWO_STATES = "two states"
 WEAKENING = "a - b"
 
 NESTED = {"lag", "trend"}
-"""Kinds of unknowns without effect at 0, so that a fit with them starts at the minimum without them."""
-LAGS = (0.0, -0.3, 0.3, -1.0, 1.0, -3.0, 3.0)  # starting values of a lag, in its natural sizes; chosen by trial
+"""Kinds of unknowns that have no effect at 0, so that a fit with them can start at the minimum without them."""
+LAGS = (0.0, -0.3, 0.3, -1.0, 1.0, -3.0, 3.0)  # starting values of the coordinate of a lag; chosen by trial
 
 
 @dataclass(frozen=True)
@@ -56,18 +56,18 @@ class FoundMinimum:
 
 @dataclass(frozen=True)
 class Remedy:
-    """Fit with another law, or with a further option, that was tried in place of a fit.
+    """Trial fit with another law, or with a further option, that may replace a fit.
 
     Attributes
     ----------
     choice : str
-        Settings that differ, as in the option `--set`.
+        Settings that differ from those of the fit, as for the option `--set`.
     ssq : float
         Sum of squares.
     gain : float
         Decrease of Schwarz's criterion (BIC), with the number of independent samples in the remaining residuals.
     p : float
-        Probability of the whiteness test.
+        Probability from the whiteness test of the residuals.
     values : dict of str to float
         Values of all unknowns, by name, and of `WEAKENING` (for the first record) if the law has a and b.
     """
@@ -80,10 +80,10 @@ class Remedy:
 
 
 def remedies(plan: Plan, ssq: float, values: Mapping[str, float], rounds: int = ROUNDS) -> tuple[Remedy, ...]:
-    """Fits with changes of the plan, the best first; up to two changes on top of each other.
+    """Trial fits with up to `rounds` changes of the plan, the best first.
 
-    Changes that take little time are tried first, and also all memories of normal stress that the law lacks, if the
-    normal stress changes. The search ends once a change leaves no structure. Each trial is short: a longer search may
+    Changes that take little time are tried first and, if the normal stress changes, all memories of it that the law
+    lacks. The search ends once a change leaves no structure in the residuals. Each trial is short: a longer search may
     find a better minimum.
 
     Parameters
@@ -92,9 +92,9 @@ def remedies(plan: Plan, ssq: float, values: Mapping[str, float], rounds: int = 
     ssq : float
         Sum of squares of the fit of the unchanged plan.
     values : mapping of str to float
-        Values of that fit, by name of the unknown, from which fits with a lag or a trend start.
+        Fitted values, by name of the unknown, from which fits with a lag or a trend start.
     rounds : int, optional
-        Number of changes that are tried on top of each other.
+        Number of changes that are tried together.
     """
     found: list[Remedy] = []
     base, known, size = plan, {""}, len(plan.space())
@@ -131,7 +131,7 @@ def _is_mended(tried: Iterable[Remedy]) -> bool:
 
 
 def mended(plan: Plan, ssq: float, values: Mapping[str, float]) -> bool:
-    """True if a change that takes little time (a lag, a trend, another evolution) fits better by strong evidence.
+    """True if a trial that takes little time (lag, trend, other evolution law) fits better by strong evidence.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def continued(plan: Plan, ssq: float, values: Mapping[str, float]) -> float:
 
 
 def _ranked(found: list[Remedy]) -> tuple[Remedy, ...]:
-    """Remedies without duplicates, the best first; a trend precedes more states that are hardly better."""
+    """Remedies without duplicates, the best first; a second state that is hardly better than a trend comes after it."""
     trend = any("fit.trend" in one.choice for one in found)
     own = {one.choice: one for one in sorted(found, key=lambda one: one.gain)}.values()
     ahead = {one.choice: STRONG_EVIDENCE * (trend and "fit.states" in one.choice) for one in own}
@@ -171,7 +171,7 @@ def _ranked(found: list[Remedy]) -> tuple[Remedy, ...]:
 
 
 def _changed(plan: Plan) -> Iterator[Plan]:
-    """Plans with one thing changed: lag, evolution and memory of the law, states, trend."""
+    """Plans that each differ in one thing: lag, evolution law, memory, number of states, or trend."""
     if plan.follows and not plan.lag:
         yield with_lag(plan)
     law, words = plan.rig.friction, plan.rig.friction.alternatives()
@@ -186,7 +186,7 @@ def _changed(plan: Plan) -> Iterator[Plan]:
 
 
 def with_words(plan: Plan, words: Sequence[str]) -> Plan:
-    """Plan with the alternative of its law that `words` name; further parameters of that law are free."""
+    """Plan with the alternative of its law that `words` name; parameters that the new law has in addition are free."""
     law: FrictionLaw = plan.rig.friction
     known = law.alternatives()
     for word in (word for word in known if word in words):
@@ -211,19 +211,19 @@ def _fitted(own: Plan, plan: Plan, ssq: float, size: int, values: Mapping[str, f
 
 
 def _is_brief(own: Plan, values: Mapping[str, float]) -> bool:
-    """True if the search for a plan can start from the values of a fit: further unknowns have no effect at 0."""
+    """True if the search for a plan can start at the values of a fit: additional unknowns have no effect at 0."""
     return {one.parameter.partition(".")[0] for one in own.space().unknowns if one.name not in values} <= NESTED
 
 
 def _recalls(own: Plan, base: Plan) -> bool:
-    """True if a plan has a memory of normal stress that the plan `base` lacks, and no more states, which take long."""
+    """True if a plan has a memory of normal stress that the plan `base` lacks, but no more states than it."""
     before, after = base.rig, own.rig
     states = len(after.of_kind("evolution effect")) > len(before.of_kind("evolution effect"))
     return before.friction.forgets_stress() and not after.friction.forgets_stress() and not states
 
 
 def _lacks_memory(own: Plan, base: Plan) -> bool:
-    """True if the law of a plan is that of the plan `base` without its memory of normal stress: it fits no better."""
+    """True if a plan only lacks the memory of normal stress of the plan `base`, so that it fits no better."""
     law, whole = own.rig.friction, base.rig.friction
     return law != whole and replace(law, **{name: getattr(whole, name) for name in whole.decided_by_stress}) == whole
 
@@ -233,7 +233,7 @@ def _effort(own: Plan, share: float = TRIAL_EFFORT) -> Effort:
 
 
 def remedy(plan: Plan, own: Plan, comparison: Comparison, z: Array, ssq: float, size: int) -> Remedy:
-    """Remedy from a minimum `z` (p,) of the plan `own`, compared with that of `plan` (`size` unknowns, sum `ssq`)."""
+    """Remedy from a minimum `z` (p,) of the plan `own`, compared with a fit of `plan` (`size` unknowns, sum `ssq`)."""
     space = comparison.space
     r = comparison.residuals(z[None])[0][0]
     parts = [r[where] for where in comparison.slices]
@@ -258,7 +258,7 @@ def weakening(rig: Slider, values: Mapping[str, float]) -> float | None:
 def _from_minimum(
     own: Plan, effort: Effort, values: Mapping[str, float], lags: Sequence[float] = LAGS, wanted: float = np.inf
 ) -> FoundMinimum:
-    """Minimum of a plan with an added lag or trend, from several starting values and the minimum without them.
+    """Minimum of a plan with an added lag or trend, searched from the minimum without it and from several lags.
 
     Searches that will not reach the sum of squares `wanted` end early.
     """
@@ -284,8 +284,8 @@ def slow_state(
 ) -> Remedy | None:  # fmt: skip
     """Fit with a second state of long slip distance in place of the last order of a trend; None for other laws.
 
-    A state whose slip distance is longer than the slip after a step evolves along a straight line, as a trend does, but
-    gives another a - b.
+    A state whose slip distance is longer than the slip after a step evolves nearly linearly, as a trend does, but leads
+    to another value of a - b.
 
     Parameters
     ----------
@@ -298,8 +298,8 @@ def slow_state(
     values : mapping of str to float
         Values of the fit with the trend, by name of the unknown, from which the search begins.
     gain : float, optional
-        Gain of the trend, to which the gain of the state over the trend is added: the numbers of independent samples
-        in both residuals differ too much for a direct comparison.
+        Gain of the trend, to which the gain of the state over the trend is added: a direct comparison is not possible,
+        as the numbers of independent samples in the two fits differ too much.
     """
     if TWO_STATES not in with_trend.rig.friction.alternatives() or len(_evolving(with_trend)) != 1:
         return None
@@ -326,10 +326,10 @@ def _evolving(plan: Plan) -> tuple[str, ...]:
 
 
 def _of_state(plan: Plan, one: Unknown, values: Mapping[str, float]) -> Array | float:
-    """Starting values of an unknown of the first or second state, from those of the single state of another plan."""
+    """Starting values of an unknown of the first or second state, from values of a plan with a single state."""
     if not (own := plan.rig.of_kind(one.kind)):
         return 0.0
-    known = own[0]  # parameters of the law come before those of memories
+    known = own[0]  # parameters of the law come before parameters of its memories
     value = values.get(known, values.get(f"{known}@1", plan.rig.value(known) or 0.0))
     if ".states.2." not in one.parameter:
         return value
@@ -337,7 +337,7 @@ def _of_state(plan: Plan, one: Unknown, values: Mapping[str, float]) -> Array | 
 
 
 def _choice(plan: Plan, other: Plan) -> str:
-    """Settings that differ between two plans, as in the option `--set`."""
+    """Settings of the plan `other` that differ from those of `plan`, as for the option `--set`."""
     law, changed = plan.rig.friction, other.rig.friction
     found = []
     for name in (item.name for item in fields(changed)):

@@ -11,9 +11,9 @@ from steadyslip.core.checks import Check, check
 from steadyslip.experiments.fitting.fitted import Fitted
 from steadyslip.experiments.numerics.noise import Noise
 
-SSQ_TOLERANCE = 1e-6  # relative tolerance for sums of squares: ten times that to which the search converges
+SSQ_TOLERANCE = 1e-6  # relative tolerance for sums of squares: ten times the tolerance of the search
 PIECES, MIN_SAMPLES = 16, 4  # pieces of a record whose means are compared, and least number of samples in each
-MAX_EXCESS = 1.0  # largest relative excess of the scatter over that of noise; by chance once in twenty million fits
+MAX_EXCESS = 1.0  # largest relative excess of scatter over the noise model; exceeded by chance once in 2e7 fits
 
 
 def residual_checks(fit: Fitted) -> tuple[Check, ...]:
@@ -32,7 +32,10 @@ def residual_checks(fit: Fitted) -> tuple[Check, ...]:
 
 
 def _excess_scatter(r: Array, noise: Noise) -> Iterator[float]:
-    """Relative excess of the scatter of piecewise means over that of the noise model; nothing for short records."""
+    """Relative excess of the scatter of means over pieces of a record over the scatter that the noise model predicts.
+
+    Nothing is returned for short records.
+    """
     length = len(r) // PIECES
     if length < MIN_SAMPLES:
         return

@@ -69,7 +69,7 @@ def load_fit(path: str | PathLike[str]) -> Fit | MachineFit:
     Raises
     ------
     NotAvailable
-        If the file was not written by one of these, is damaged, or cannot be read.
+        If the file was not written by these methods, is damaged, or cannot be read.
 
     Examples
     --------

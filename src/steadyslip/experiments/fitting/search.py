@@ -1,6 +1,6 @@
 """Global search for the least sum of squares: many starts on few samples, then the best of them on all samples.
 
-Constants without a stated bound were chosen by trial on synthetic and published records; they trade computing time
+Constants without a stated reason were chosen by trial on synthetic and published records: they balance computing time
 against the chance that the best minimum is missed.
 """
 
@@ -27,24 +27,24 @@ from steadyslip.experiments.measured.record import transient_rows
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, HOPE, SAME_SSQ, Minima, minimise
 from steadyslip.experiments.numerics.noise import SIGNIFICANT, STRUCTURE, lag_one, largest_jump, whiteness
 
-ROUGH_SAMPLES = 400  # samples, over all records, of the first stage
+ROUGH_SAMPLES = 400  # number of samples of all records together in the first stage
 ROUGH_PATIENCE = 8
-"""Most integration steps per sample in the first stage; later stages allow `effort.MAX_STEPS_PER_ROW`."""
-ROUGH_GROWTH = 2.0  # first stage: give a motion up after this multiple of the steps of the slowest finished one
-ROUGH_ITERATIONS = 40  # iterations at most in the first stage; its tolerance is loose, so most starts end earlier
-MAX_ITERATIONS = 300  # iterations at most on all samples, or on the condensed ones
-FINAL_ITERATIONS = 12  # iterations at most on all samples after condensed ones: the minimum is nearly reached by then
-FIRST_STARTS = 8  # starts of the first round: one per SIMD lane, so they cost about as much as one
-MIN_ARRIVED = 3  # starts that must reach the best minimum before the search may stop; one alone may be a chance
-FINALISTS = 8  # ends of the first stage that go on: one per SIMD lane
-NESTED_STARTS = 8  # starts that test whether a nested model can compete: one per SIMD lane
-MAX_POLISHED = 3  # ends on condensed samples that are refined on all samples
-ROUGH_SHARE, REFINE_SHARE = 0.5, 0.8  # shares of the work of one search spent when its first and second stages end
-NESTED_SHARE = 0.2  # share of the work of one search that each nested model may add to that of its own search
+"""Largest number of integration steps per sample in the first stage; later stages allow `effort.MAX_STEPS_PER_ROW`."""
+ROUGH_GROWTH = 2.0  # first stage: a motion is given up after this multiple of the slowest completed motion's steps
+ROUGH_ITERATIONS = 40  # most iterations in the first stage, whose tolerance is so large that most starts end earlier
+MAX_ITERATIONS = 300  # most iterations on all samples, or on condensed samples
+FINAL_ITERATIONS = 12  # most iterations on all samples after condensed samples, which lead nearly to the minimum
+FIRST_STARTS = 8  # number of starts in the first round: eight SIMD lanes run them in about the time of one start
+MIN_ARRIVED = 3  # starts that must reach the best minimum before the search may stop; a single one may be chance
+FINALISTS = 8  # number of end points of the first stage that are refined: one per SIMD lane
+NESTED_STARTS = 8  # number of starts that test whether a nested model can compete: one per SIMD lane
+MAX_POLISHED = 3  # largest number of end points on condensed samples that are refined on all samples
+ROUGH_SHARE, REFINE_SHARE = 0.5, 0.8  # the first and the second stage end when this share of a search's work is spent
+NESTED_SHARE = 0.2  # work allowed for each nested model in addition to its own search, as a share of one search's work
 REORDER_TOLERANCE = 1e-9  # relative change of the sum of squares by rounding when states are renumbered
-MIN_GAIN = 1e-8  # least relative gain on condensed samples that is worth iterations on all samples
-MIN_CONDENSED_SIZE = 50_000  # elements of the derivatives of all finalists; condensing fewer costs more than it saves
-WINDOW_SHARES = (0.25, 0.5, 0.75)  # shares of its window at which a time that reached an end of the window starts again
+MIN_GAIN = 1e-8  # a smaller relative gain on condensed samples is not worth iterations on all samples
+MIN_CONDENSED_SIZE = 50_000  # samples are condensed if the finalists have at least this many derivatives, to save time
+WINDOW_SHARES = (0.25, 0.5, 0.75)  # a time that reached an end of its window starts again at these shares of it
 
 Progress = Callable[[str, int, float], None]
 """Progress callback: name of the stage, number of starts tried, root mean square of the best residuals."""
@@ -79,7 +79,7 @@ class SearchSummary:
 
     @property
     def is_chance(self) -> bool:
-        """True if fewer starts than are enough lead to the best minimum."""
+        """True if so few starts lead to the best minimum that it may have been found by chance."""
         return self.arrived < min(MIN_ARRIVED, self.starts)
 
 
@@ -92,14 +92,14 @@ class SearchResult:
     coordinates : ndarray (p,)
         Coordinates of the best minimum.
     ssq : float
-        Sum of squares there.
+        Sum of squares at the best minimum.
     comparison : Comparison
         Model and records whose sum of squares was minimised.
     summary : SearchSummary
     bounds : (ndarray, ndarray)
         Lower and upper bounds of the coordinates, each (p,).
     ends : ndarray (m, p)
-        Where other starts ended, the best first: perhaps in minima that fit as well.
+        Points at which other starts ended, the best first; there may be minima near them that fit as well.
     """
 
     coordinates: Array
@@ -111,7 +111,7 @@ class SearchResult:
 
 
 SearchCache = dict[tuple[tuple[str, ...], int, bool, str], SearchResult | None]
-"""Results for nested models that were already searched, by free parameters, trend order, offset and initial."""
+"""Results of searches for nested models, by free parameters, order of the trend, offset and option `initial`."""
 
 
 def _search_or_none(
@@ -129,11 +129,11 @@ def find_minimum(
 ) -> SearchResult:
     """Search for the least sum of squares of a plan.
 
-    The first round tries `FIRST_STARTS` starts. If the normal stress and the rate change, the second round follows more
-    and more of the record (`growing`). More rounds follow until several starts agree and the residuals are white noise,
-    or until four times `starts` have been tried. If the model contains simpler (nested) models, their minima are
+    The first round tries `FIRST_STARTS` starts. If the normal stress and the rate change, the second round fits a
+    growing part of the record (`growing`). More rounds follow until several starts agree and the residuals are white
+    noise, or until four times `starts` have been tried. If the model contains simpler (nested) models, their minima are
     further starts. When the budget of the search is spent, the best minimum so far is returned. A nested model has the
-    budget of a separate fit, so that its search ends where a separate fit ends.
+    budget of a separate fit, so that its search ends at the same minimum as a separate fit.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def find_minimum(
             continue
         search.refine_finalists()
         if search.arrived < MIN_ARRIVED and upto >= starts:
-            search.rough_model = search.rough_plan.comparison(effort)  # motions are no longer given up early
+            search.rough_model = search.rough_plan.comparison(effort)  # this model no longer gives motions up early
         if not last and (search.arrived < MIN_ARRIVED or (upto < starts and search.arrived < upto / 3)):
             continue
         found = search.refine_best()
@@ -176,7 +176,7 @@ def find_minimum(
 
 
 def _suspects(plan: Plan) -> str:
-    """Question to the user about probable causes if a model cannot follow the records."""
+    """Question to the user about the probable cause if a model cannot follow the records."""
     if plan.protocol is None:
         return "are law and drive those of the experiment?"
     return "are the law and the protocol (its rates, units, and times on the records' clock) those of the experiment?"
@@ -189,7 +189,7 @@ class _Search:
     ----------
     plan : Plan
     starts : int
-        Number of starts that the user asked for; nested models are searched from as many.
+        Number of starts that the user asked for, which also holds for the search of nested models.
     effort : Effort
         Limits of the computation, with the budget of the whole fit.
     progress : callable or None
@@ -197,11 +197,11 @@ class _Search:
     Attributes
     ----------
     rough : Minima
-        Ends of all starts on few samples, including those with a growing part of the record.
+        End points of all starts on few samples, including starts with a growing part of the record.
     grown : int
         Number of starts with a growing part of the record.
     best : Minima
-        Ends of the finalists on condensed samples, or on all samples if none are condensed.
+        End points of the finalists on condensed samples, or on all samples if samples are not condensed.
     finalists : ndarray (m, p)
         Finalists whose motion reaches the last sample.
     arrived : int
@@ -247,7 +247,7 @@ class _Search:
         return report
 
     def try_starts(self, upto: int) -> None:
-        """Minimise on few samples from further starting points, until `upto` have been tried."""
+        """Minimise on few samples from further starting points, until `upto` points have been tried in all."""
         already = len(self.rough.ssq) - self.grown
         begin = starting_points(self.whole.parts, self.features, self.whole.space, upto - already, already)
         model = self.rough_model
@@ -255,7 +255,7 @@ class _Search:
         self.rough = self.rough + ends
 
     def try_grown_starts(self) -> None:
-        """Minimise on few samples from the first starting points, which follow more and more of the records."""
+        """Minimise on few samples from the first starting points, fitting a growing part of the records."""
         begin = starting_points(self.whole.parts, self.features, self.whole.space, FIRST_STARTS, 0)
         effort = replace(self.effort, patience=ROUGH_PATIENCE, growth=ROUGH_GROWTH)
         ends = grown(self.rough_plan, begin, self.low, self.high, effort, self._of_starts())
@@ -263,7 +263,7 @@ class _Search:
         self.rough = self.rough + ends
 
     def _of_starts(self) -> dict[str, Any]:
-        """Options of `minimise` for starts on few samples; begins their stage of work."""
+        """Options of `minimise` for starts on few samples; makes the allowance of this stage the current one."""
         self.allowance = self.stages[0]
         return {
             "most": ROUGH_ITERATIONS, "tolerance": 1e-4, "race": MIN_ARRIVED, "stop": self.allowance,
@@ -271,10 +271,10 @@ class _Search:
         }  # fmt: skip
 
     def refine_finalists(self) -> None:
-        """Refine the finalists on condensed samples (all, if none are condensed) and count the starts that agree."""
+        """Refine the finalists on condensed samples (if there are none, on all) and count the starts that agree."""
         self.allowance = self.stages[1]
         begin, counts = self.rough.distinct(FINALISTS)
-        if len(self.best.ssq):  # the best of earlier rounds competes as well
+        if len(self.best.ssq):  # the best point of earlier rounds is a finalist as well
             begin = np.concatenate([begin, self.best.sorted().coordinates[:1]])
             counts = np.append(counts, 0)
         begin, counts, predicted, slopes = self._computable(begin, counts)
@@ -295,8 +295,8 @@ class _Search:
     def _computable(self, begin: Array, counts: Array) -> tuple[Array, Array, Array, Array]:
         """Finalists whose motion reaches the last sample, with counts, model friction (m, n) and derivatives (m, p, n).
 
-        A motion that passes on few samples, with looser tolerances, may run away on all. If all finalists do, the next
-        best ends of the first stage are tried.
+        A motion that is completed on few samples, with larger tolerances, may run away on all samples. If the motions
+        of all finalists do so, the next best end points of the first stage are tried.
         """
         waiting, first = [(begin, counts)], 0
         while waiting:
@@ -312,7 +312,7 @@ class _Search:
         return begin, counts, np.empty((0, self.whole.size)), np.empty((0, begin.shape[1], self.whole.size))
 
     def refine_best(self) -> Minima:
-        """Minimise the best finalists on all samples; the best first."""
+        """Minima on all samples from the best finalists, sorted by sum of squares."""
         self.allowance = self.stages[2]
         begin = self.best.coordinates if self.condensed is self.whole else self.best.distinct(MAX_POLISHED)[0]
         found = self._minimise_on_all(begin)
@@ -322,7 +322,7 @@ class _Search:
         return (found + self._refine_from(inside)).sorted() if len(inside) else found
 
     def nested(self, found: Minima, known: SearchCache) -> Minima:
-        """Add minima reached from the minima of nested models; the best first."""
+        """Minima `found` and those reached from the minima of nested models, sorted by sum of squares."""
         for model in nested_models(self.plan):
             if not self.cut and not self._can_compete(model):
                 continue
@@ -339,16 +339,16 @@ class _Search:
         return found
 
     def with_other_sign(self, found: Minima) -> Minima:
-        """Add the minimum reached from a start at which a - b has the other sign; the best first.
+        """Minima `found` and the minimum reached from a start at which a - b has the other sign, the best first.
 
-        If only the normal stress changes, laws that strengthen and laws that weaken with velocity fit nearly as well,
-        with different memories of normal stress, and all starts may lead to the same of the two.
+        If only the normal stress changes, a law that strengthens and a law that weakens with velocity fit nearly
+        equally well, with different memories of normal stress, and all starts may lead to only one of the two.
         """
         begin = of_other_sign(self.whole.space, found.coordinates[:1])
         return (found + self._refine_from(np.clip(begin, self.low, self.high))).sorted() if len(begin) else found
 
     def ends(self, found: Minima) -> Array:
-        """Coordinates (m, p) of other ends, on all samples and of the first stage, the best of each first."""
+        """Coordinates (m, p) of other end points: those on all samples, then those of the first stage; best first."""
         others = [own.distinct(FINALISTS)[0] for own in (found, self.rough)]
         return sort_states(np.concatenate(others)[1 : FINALISTS + 1], self.whole.space)
 
@@ -368,7 +368,7 @@ class _Search:
         return bool(np.min(ends.ssq, initial=np.inf) <= HOPE * np.min(self.rough.ssq))
 
     def _refine_from(self, begin: Array) -> Minima:
-        """Minimise on condensed samples first, then from ends that improve on the best on all samples."""
+        """Minima on all samples, searched on condensed samples first; empty if these do not improve on the best."""
         if self.condensed is not self.whole:
             known = float(np.min(self.best.ssq))
             ends = minimise(
@@ -379,7 +379,7 @@ class _Search:
         return self._minimise_on_all(begin)
 
     def _minimise_on_all(self, begin: Array) -> Minima:
-        """Minimise on all samples: after condensed samples with few iterations, and more if those do not converge."""
+        """Minima on all samples; after condensed samples, few iterations are tried first, then more if needed."""
 
         def ends(start: Array, most: int, held: Array | None = None) -> Minima:
             report = self.reporter("refining", self.whole)
@@ -393,13 +393,13 @@ class _Search:
             found = (ends(found.coordinates[:1], MAX_ITERATIONS) + found).sorted()
         times = times_of_changes(self.whole.space)
         if len(begin) and np.isfinite(found.ssq[0]) and not found.converged[0] and np.any(times):
-            beside = ends(found.coordinates[:1], MAX_ITERATIONS, times[None])  # a time at a kink stops all others
+            beside = ends(found.coordinates[:1], MAX_ITERATIONS, times[None])  # a time at a kink stops the whole search
             beside.converged[:] = False
             found = (ends(beside.coordinates, FINAL_ITERATIONS) + beside + found).sorted()
         return found
 
     def summary(self, found: Minima) -> SearchSummary:
-        """Summary of the search that ended with minima `found`, the best first."""
+        """Summary of the search that ended with the minima `found`, of which the best is first."""
         others = [found.ssq / found.ssq[0]]
         for ends in (self.rough, self.best):
             done = ends.ssq[ends.converged]
@@ -413,7 +413,8 @@ class _Search:
 def _moved_inside(space: Space, coordinates: Array, low: Array, high: Array) -> Array:
     """Copies (0 or more, p) of a point in which times at a bound of their window are moved inside the window.
 
-    Within a sampling interval the misfit may have several minima: a time at an end may hide a better one.
+    Within a sampling interval the misfit may have several minima, and one inside the window may be better than that at
+    its end.
     """
     ended = times_of_changes(space) & ((coordinates <= low) | (coordinates >= high))
     if not np.any(ended):
@@ -428,7 +429,7 @@ def times_of_changes(space: Space) -> Array:
 
 
 def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
-    """True if residuals have structure beyond decaying correlation, perhaps because a better minimum exists."""
+    """True if residuals have structure that noise with decaying correlation lacks: a better minimum may exist."""
     r = whole.residuals(coordinates[None])[0][0]
     parts = [r[where] for where in whole.slices]
     if jump_left(whole, r):
@@ -439,16 +440,16 @@ def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
 
 
 def jump_left(comparison: DataComparison, residuals: Array) -> float:
-    """Largest jump of weighted residuals (n,) in standard deviations of their noise; 0 where no record has one."""
+    """Largest jump of weighted residuals (n,) in standard deviations of their noise; 0 if no record has a jump."""
     data = comparison.data * comparison.weights
     return max(largest_jump(residuals[where], data[where]) for where in comparison.slices)
 
 
 def first_computable(comparison: Comparison, found: Minima) -> Minima:
-    """Minima sorted so that the first has finite residuals and derivatives when it is computed alone.
+    """Minima sorted by sum of squares, where the first has finite residuals and derivatives when computed alone.
 
     The steps of a motion that accelerates strongly depend on rounding, which differs with the lane of the SIMD vector;
-    such a motion may be completed among others and fail alone. Its sum of squares is then set to inf.
+    such a motion may be completed together with others but fail alone. Its sum of squares is then set to inf.
     """
     while np.isfinite(found.ssq[0]):
         residuals, slopes = comparison.residuals(found.coordinates[:1])
@@ -459,7 +460,7 @@ def first_computable(comparison: Comparison, found: Minima) -> Minima:
 
 
 def minima_near(comparison: Comparison, begin: Array, bounds: tuple[Array, Array], effort: Effort) -> Minima:
-    """Minima on all samples from starting points (m, p), the best computable one first."""
+    """Minima on all samples from starting points (m, p); the first is the best that can be computed alone."""
     ends = minimise(
         lambda z, _: comparison.residuals(z), begin, *bounds, most=MAX_ITERATIONS, stop=effort.budget.part(np.inf)
     )
@@ -482,7 +483,7 @@ def with_states_sorted(comparison: Comparison, found: Minima) -> tuple[Array, fl
 
 
 def sort_states(coordinates: Array, space: Space) -> Array:
-    """Coordinates (m, p) with the states of each law renumbered by rising slip distance; equal minima become equal."""
+    """Coordinates (m, p) with the states of each law numbered by rising slip distance, to compare minima."""
     members: dict[tuple[int | None, str], dict[str, dict[str, int]]] = {}
     for i, one in enumerate(space.unknowns):
         owner, _, last = one.parameter.rpartition(".")
@@ -502,7 +503,7 @@ def sort_states(coordinates: Array, space: Space) -> Array:
 
 
 def _rough_plan(plan: Plan) -> Plan:
-    """Plan with about `ROUGH_SAMPLES` samples over all records, dense where the loading changes."""
+    """Plan with about `ROUGH_SAMPLES` samples in all records together, dense after changes of the loading."""
     count = max(ROUGH_SAMPLES // len(plan.records), 100)
     rows = []
     for record, sharp in zip(plan.records, plan.sharp, strict=True):

@@ -11,12 +11,12 @@ from steadyslip.core.entries import LabelledNumbers, Names, Text, Whole
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import Settings, option, parameter, setting
 
-STARTS = 48  # default number of starting points: six batches of the eight sets that run side by side
+STARTS = 48  # default number of starting points: six batches of eight, as eight motions are integrated at a time
 LOSSES = ("linear", "soft-l1", "huber", "cauchy")
-MOST_STARTS = 10**6  # limits memory: all starts are drawn at once, some 100 bytes each
-MOST_EFFORT = 1e6  # guards against mistaken numbers: a fit of a second would take days
-MOST_TREND = 6  # highest order: a polynomial of higher order would follow the steps instead of the law
-MOST_STATES = 100  # guards against mistaken numbers: records determine two or three states
+MOST_STARTS = 10**6  # largest number of starts, to limit memory: all are drawn at once, some 100 bytes each
+MOST_EFFORT = 1e6  # largest effort, against mistakes: with more, a fit of a second would take days
+MOST_TREND = 6  # highest order of a trend: a polynomial of higher order would follow the steps instead of the law
+MOST_STATES = 100  # largest number of states, against mistakes: records determine two or three states
 _effort = Domain(0, MOST_EFFORT, False, True, "a number above 0, up to a million")
 _width = Domain(0, math.inf, False, False, "a finite number above 0, in units of what is fitted")
 
@@ -82,7 +82,7 @@ class FitSettings(Settings):
 
 
 STRESS = "normal stress"
-DRAWS = (100, 10**6)  # least number, as 95 % intervals need some draws beyond their ends; largest, for memory
+DRAWS = (100, 10**6)  # fewest draws, so that some are beyond the ends of 95 % intervals; most draws, for memory
 _scale = Domain(0, 100, False, True, "a number above 0, up to 100")
 
 
@@ -126,7 +126,7 @@ class PopulationSettings(Settings):
 
 
 def faults(options: Mapping[str, Any]) -> tuple[Problem, ...]:
-    """Problems with the options of a fit."""
+    """Problems with the options of a fit; empty if all are valid."""
     try:
         FitSettings(**options)
     except ParameterError as error:

@@ -21,9 +21,9 @@ from steadyslip.experiments.numerics.profiled import ProfiledMinimum, intervals,
 from steadyslip.laws.friction.law import FrictionLaw
 
 LEVELS = (0.6827, 0.95)
-"""Probabilities of the intervals: that of one standard deviation of a normal error, and 95 %."""
+"""Probabilities of the intervals: 68 %, as of one standard deviation of a normal error, and 95 %."""
 HELD = ("exponent", "viscosity")
-"""Kinds of parameters that are held, in this order, if rows are few: at their default value, or else at 0."""
+"""Kinds of parameters that are fixed, in this order, if rows are few: at their default value or, without one, at 0."""
 SAME = 1e-6  # speeds or loads with a smaller relative difference count as equal
 
 
@@ -51,13 +51,14 @@ class DirectionFit(ReadOnly):
     ----------
     forward : bool
     estimates : tuple of SpeedEstimate
-        If the table has a load: friction coefficients and values per load. Otherwise: forces (torques) and the like.
+        Friction coefficients and values per load if the table has a load; otherwise forces (torques) and values that
+        refer to them.
     law : FrictionLaw
         Law with the estimates; parameters that a table does not determine have default values.
     load : float
-        Median load of the table, N; 1 without a load, so that coefficients are forces.
+        Median load of the table, N; 1 if the table has no load, so that coefficients are forces.
     speed, friction, fitted : ndarray (n,)
-        m/s (rad/s), N (N m) or coefficients.
+        Speed, m/s (rad/s); measured and fitted friction, N (N m) or coefficients.
     scatter : float
         Standard deviation of friction about the curve: a share of friction, or N (N m) with absolute errors.
     freedom : int
@@ -143,7 +144,7 @@ def _chosen(
     held: Mapping[str, float],
     forward: bool,
 ) -> tuple[SteadyCurve, list[str]]:
-    """Curve with as many free parameters as the rows determine, and notes on parameters that are held."""
+    """Curve with as many free parameters as the rows determine, and notes on parameters that are fixed."""
     notes: list[str] = []
     reference = float(np.exp(np.mean(np.log(speed))))
     speeds, fixed = _distinct(speed), dict(held)
@@ -203,9 +204,9 @@ def _estimate(
 
 
 def unit_of(role: Parameter, table: SpeedTable, bent: bool) -> str:
-    """SI unit of a parameter for a table: in forces if it has no load, in angles if its speeds are angular.
+    """SI unit of a parameter for a table: per force if the table has no load, per angle if its speeds are angular.
 
-    `bent` is true for parameters with which friction does not rise in proportion (scales and exponents).
+    `bent` is true for parameters to which friction is not proportional (scales and exponents).
     """
     shown = role.unit
     if shown == "N":  # a load
@@ -254,8 +255,8 @@ class SpeedFindings(ReadOnly):
         return self.main[name]
 
 
-FEWEST_ROWS = 5  # least number of rows of a loop: two forward, two back, and the turning point
-LEAST_RISE = 1e-3  # steps of displacement below this share of the largest do not count for the stiffness
+FEWEST_ROWS = 5  # least number of rows of a loop: two forward, two backward, and the turning point
+LEAST_RISE = 1e-3  # steps of displacement below this share of the largest step are not used for the stiffness
 
 
 @dataclass(frozen=True)
@@ -292,7 +293,7 @@ def loop_forces(displacement: Array, stiffness: float, breakaway: float, first: 
     force[0], slopes[0] = now, by
     for i, step in enumerate(np.diff(displacement), start=1):
         end, decay = math.copysign(breakaway, step), math.exp(-abs(step) * stiffness / breakaway)
-        rate = abs(step) * stiffness / breakaway * decay * (end - now)  # derivative by ln(K/F_S)
+        rate = abs(step) * stiffness / breakaway * decay * (end - now)  # derivative of the force by ln(K/F_S)
         by = by * decay + np.array([rate, (1 - decay) * end - rate, 0.0])
         now = end + (now - end) * decay
         force[i], slopes[i] = now, by

@@ -1,8 +1,8 @@
 """Starting points and bounds of the search, derived from features of the records.
 
-The direct effect is at least the first response to a step of the rate, the drop to the new steady friction gives
-a − b, the steepest rise of friction with displacement is at most the stiffness over normal stress, and the slip
-distance lies between the slip per sample and that of the whole record. Many combinations are tried side by side.
+The direct effect is at least the first response to a step of the rate. The change to the new steady friction gives
+a − b. The steepest rise of friction with displacement is at most the stiffness over normal stress. The slip distance
+lies between the slip per sample and the slip of the whole record. Many combinations of such values are tried.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from steadyslip.model.sliding import steady_state
 WINDOW_SHARE = 0.5  # share of the window of a free time over which its starting values are spread
 SPIKE_RATIO = 2.0  # a sample is a spike if it is off its neighbours by more than this multiple of the range of friction
 MAX_STIFFNESS_RATIO = 100.0  # largest starting value of k d_c/(aσ): records do not determine a stiffer machine
-FASTER = 100.0  # largest starting value of a velocity scale, as a multiple of the fastest rate: slip events are faster
-FURTHER = 2  # velocity scales that start independently of each other: v_a and v_b
+FASTER = 100.0  # largest starting value of a velocity scale over the fastest rate of the load point: slip can be faster
+FURTHER = 2  # number of velocity scales that start independently of each other: v_a and v_b
 _DIRECT = (0.004, 0.01, 0.025)  # starting values of a without a velocity step: the range usual for rocks
 _SIGN = ("direct effect", "evolution effect")  # kinds of a and b
 OTHER_SIDE = (0.5, 2.0)  # starting values of b/a in a search for a − b of the other sign: usual in laboratories
@@ -47,9 +47,9 @@ class Features:
     friction : float
         Initial friction coefficient.
     direct : float or None
-        Peak change of friction after the largest velocity step, per e-fold of velocity.
+        Peak change of friction after the largest velocity step, over the change of ln(velocity).
     drop : float or None
-        Change of steady friction per e-fold of velocity, a − b.
+        Change of steady friction over the change of ln(velocity), a − b.
     slope : float
         Steepest rise of friction with displacement of the load point, 1/m.
     least_slope : float
@@ -115,7 +115,7 @@ def _displacement(record: Record, rate: float) -> Array:
 
 
 def _step_response(record: Record, moved: Array, step: LoadStep) -> tuple[float, float]:
-    """Peak and steady change of friction after a velocity step, per e-fold of velocity."""
+    """Peak and steady change of friction after a velocity step, both over the change of ln(velocity)."""
     time, mu = record.time, record.friction
     fold = float(np.log(step.after / step.before))
     others = [s.time for s in record.steps if s.time > step.time + step.duration]
@@ -188,7 +188,7 @@ def starting_points(
     steepness = max(f.slope for f in found) * 10.0 ** (1.2 * grid[:, 3] - 0.1)
     steepness = np.minimum(steepness, MAX_STIFFNESS_RATIO * a / d_c)
     alpha = 0.1 + 0.5 * grid[:, 4]
-    alike = np.argsort(steepness / a)  # similar stiffness side by side, as SIMD lanes wait for the slowest one
+    alike = np.argsort(steepness / a)  # similar stiffness next to each other, as SIMD lanes wait for the slowest lane
     d_c, a, b, steepness, alpha, grid = (x[alike] for x in (d_c, a, b, steepness, alpha, grid))
     values = np.zeros((count, len(space)))
     for i, unknown in enumerate(space.unknowns):
@@ -219,7 +219,7 @@ def search_bounds(parts: Sequence[RecordPart], known: Sequence[Features], space:
         own = known if unknown.record is None else [known[unknown.record]]
         if unknown.kind == "slip distance":
             ends = min(f.shortest for f in own) / 5, max(f.longest for f in own) * 40
-        elif unknown.kind == "drainage":  # slower than the record, or faster than its samples, it has no effect
+        elif unknown.kind == "drainage":  # slower than the record, or faster than its sampling, drainage has no effect
             times = [parts[k].record.time for k in range(len(parts)) if unknown.record in (None, k)]
             ends = 0.03 / max(map(np.ptp, times)), 10.0 / min(float(np.min(np.diff(time))) for time in times)
         elif unknown.kind == "direct effect":
@@ -235,7 +235,7 @@ def search_bounds(parts: Sequence[RecordPart], known: Sequence[Features], space:
 
 
 def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Array, ...], alone: bool) -> Array:
-    """Starting values (count,) of one unknown; `alone` is True if no other is of its kind."""
+    """Starting values (count,) of one unknown; `alone` is True if no other unknown is of the same kind."""
     name = unknown.parameter
     d_c, a, b, steepness, alpha, spare = design
     rig = part.rig
@@ -247,7 +247,7 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
         rate = rig.drive.velocity / (references[0] or 1.0) if references else 1.0
         return np.asarray(own.friction - (a - b) * np.log(rate))
     if unknown.kind == "evolution effect":
-        if member and not alone:  # the first state gets what the others leave
+        if member and not alone:  # the first state gets what the other states leave
             return b * (0.35 + 0.5 * spare) if member == 1 else b * (0.65 - 0.5 * spare)
         return b
     if unknown.kind == "slip distance":
@@ -256,7 +256,7 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
         return alpha
     if unknown.kind == "velocity scale":
         return own.slowest * (FASTER * own.fastest / own.slowest) ** spare
-    if unknown.kind == "drainage":  # between a few samples and the record
+    if unknown.kind == "drainage":  # drainage takes between a few samples and the whole record
         span, spacing = float(np.ptp(part.record.time)), float(np.median(np.diff(part.record.time)))
         return (0.3 / spacing) * (10 * spacing / span) ** spare
     if unknown.kind == "immediate share":

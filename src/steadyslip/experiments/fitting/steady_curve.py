@@ -26,13 +26,13 @@ FURTHER = {
     DAMPING: Parameter("N s/m", nonnegative, "viscous drag that does not depend on the load"),
 }
 ONLY_COMBINED = ("direct effect", "reference rate")
-"""Kinds of parameters that steady friction determines only in combination: a with b, v* with μ*."""
-FARTHEST = 100.0  # bounds of a velocity scale: this factor beyond the measured speeds
+"""Kinds of parameters that steady friction determines only in combination with another: a with b, v* with μ*."""
+FARTHEST = 100.0  # a velocity scale is searched up to this factor below and above the measured speeds
 OFFSETS = 100.0  # bound of the internal preload, as a multiple of the largest load of the table
-LARGEST = 100.0  # bound of other parameters, as a multiple of the value at which one alone makes the whole friction
+LARGEST = 100.0  # bound of another parameter, as a multiple of its value at which it alone makes the whole friction
 EXPONENTS = (0.1, 10.0)  # bounds of exponents: from a flat curve to a step
 SCALE_STARTS, OTHER_STARTS, SEARCHED = 6, (0.6, 1.2, 2.5), 4
-"""Grid of starting points (number of velocity scales, values of exponents), and number of searches from it."""
+"""Number of velocity scales and values of exponents in the grid of starting points; number of best points searched."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class SteadyCurve:
         return pressed * mu + more.get(DAMPING, 0.0) * speed, np.hstack(columns)
 
     def values(self, inner: Array) -> Array:
-        """Parameters in SI units from the searched ones, some of which are logarithms."""
+        """Parameters in SI units from the searched parameters, some of which are logarithms."""
         return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, inner, 0.0)), inner)
 
     def residuals(self, inner: Array, speed: Array, load: Array, force: Array, relative: bool) -> tuple[Array, Array]:
@@ -87,7 +87,7 @@ class SteadyCurve:
         slopes = slopes * np.where(self.logarithmic, values, 1.0)
         if not relative:
             return found - force, slopes
-        floor = 1e-9 * float(np.min(force))  # keeps logarithms finite where a trial's friction is negative
+        floor = 1e-9 * float(np.min(force))  # keeps logarithms finite where the friction of a trial is negative
         safe = np.maximum(found, floor)
         return np.log(safe / force), np.where(found > floor, 1.0, 0.0)[:, None] * slopes / safe[:, None]
 
@@ -116,9 +116,9 @@ class SteadyCurve:
         return np.array(low), np.array(high)
 
     def starts(self, speed: Array, load: Array, force: Array, relative: bool) -> list[Array]:
-        """Starting points of the search, best first, each (free,), from a grid of velocity scales and exponents.
+        """Starting points (free,) of the search, the best first, from a grid of velocity scales and exponents.
 
-        The other parameters follow by linear least squares within bounds; `relative` weighs residuals by 1/`force`.
+        Other parameters follow by linear least squares within bounds; `relative` weights residuals by 1/`force`.
         """
         from scipy.optimize import lsq_linear
 
@@ -151,7 +151,7 @@ class SteadyCurve:
 def steady_curve(
     law: type[FrictionLaw], reference: float, held: Mapping[str, float], more: Sequence[str]
 ) -> SteadyCurve:
-    """Steady friction of a law with all parameters free that a table of speeds determines.
+    """Steady friction of a law in which all parameters that a table of speeds determines are free.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def _record(law: type[FrictionLaw]) -> FrictionLaw:
 
 @cache
 def _compiled(law: type[FrictionLaw], fixed: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[bool, ...], Any]:
-    """Free parameters of a law's steady friction, marks of those it is nonlinear in, and a function that computes it.
+    """Free parameters of a law's steady friction, True for each that is nonlinear, and a function for the friction.
 
     The function takes the fixed values, the speeds and the free values, and returns friction and its derivatives.
     """

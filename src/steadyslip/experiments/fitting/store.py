@@ -41,11 +41,11 @@ _OPTIONS = {
     "initial": str, "loss": str, "width": {float, None},
     "calibrated": {float, None}, "rtol": float,
 }  # fmt: skip
-_CURVE = ([float], float, float, float, int, [float], [float])  # ends of its span, or none; then `Smooth.parts`
-_NUMBERS = len(fields(Change)) - 1  # numbers of a change in files, without its pieces; 8 in files without lags
+_CURVE = ([float], float, float, float, int, [float], [float])  # ends of the curve's span, or none; then `Smooth.parts`
+_NUMBERS = len(fields(Change)) - 1  # count of numbers that describe a change without pieces; 8 in files without lags
 _COURSE = (float, [[float]], [float], [_CURVE], float, int, int, int, int, [[float]])  # servos or shapes last
 _COLUMNS = (*ROLES, "worth")
-KNOWN = "known"  # option `initial` of a fit whose `beginnings` are known from a fit to the time before
+KNOWN = "known"  # option `initial` in files of fits whose `beginnings` are known from a fit to the time before
 RESULT_FORMS: dict[str, Any] = {
     "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool, "cut": bool},
     "unidentified": [{"weights": {str: float}, "deviation": float}],
@@ -70,7 +70,7 @@ S = TypeVar("S", bound=FitNumbers)
 
 
 def result_variables(fit: Fitted, samples: Sequence[str]) -> dict[str, Any]:
-    """Variables that files of all fits have; `samples` holds the name of each series' dimension."""
+    """Variables that are in the files of all fits; `samples` holds the name of each series' dimension."""
     variables: dict[str, Any] = {
         "coordinates": ("parameter", fit.coordinates, {"long_name": "place of the minimum, logarithms where positive"}),
         "value": ("parameter", np.array(list(fit.values.values())), {}),
@@ -101,7 +101,7 @@ def result_columns(samples: Sequence[str]) -> dict[str, ColumnRule]:
 
 
 def result_attributes(fit: Fitted) -> dict[str, Any]:
-    """Attributes that files of all fits have, see `RESULT_ATTRIBUTES`."""
+    """Attributes that are in the files of all fits, see `RESULT_ATTRIBUTES`."""
     return {
         "ssq": fit.ssq,
         "search": json.dumps(vars(fit.search)),
@@ -333,7 +333,7 @@ def _record(
 
 
 def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, Any], weights: Any) -> Plan:
-    """Plan from the options of the file, which are checked like user input."""
+    """Plan from the options in a file, which are checked like user input."""
     from steadyslip.files.specifications import protocol_from_text, slider_from_text
 
     text, source = table.attributes["rig"], str(table.path)

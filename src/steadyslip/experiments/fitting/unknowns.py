@@ -62,7 +62,7 @@ class Unknown:
 
 
 def unknown(address: Address, record: int | None, scale: float | None = None) -> Unknown:
-    """Unknown of a parameter, with a logarithmic coordinate if it must be positive and has no natural size."""
+    """Unknown for a parameter, with a logarithmic coordinate if the parameter is positive and declares no size."""
     name, domain = address.name, address.role.domain
     own = f"{name}@{record + 1}" if record is not None else name
     role = address.role

@@ -2,8 +2,8 @@
 
 If derivatives of the model are nearly dependent, parameters can replace each other over a range in which the model is
 not linear. Errors from the covariance may then be several times too small. Therefore the parameter that is most nearly
-a combination of the others is held at distances from the minimum, on both sides, and the others are fitted again: its
-error follows from the rise of the sum of squares.
+a combination of other parameters is fixed at distances on both sides of the minimum, and all other parameters are
+fitted again: errors follow from the rise of the sum of squares.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from steadyslip.experiments.fitting.estimates import (
 from steadyslip.experiments.numerics.least_squares import minimise
 
 DEPENDENT = 1e-3
-"""Derivatives are nearly dependent below this eigenvalue of JᵀJ, scaled to a diagonal of 1: it is .004 for usual steps
-and 3e-4 along open directions."""
-LEAST_DEVIATION = 0.05  # least standard deviation of a valley (e-folds or natural sizes): models are linear over less
-OPEN_DISTANCES = (1.0, 2.0, 4.0)  # distances along an open direction, in e-folds or natural sizes
-REACH = 1.96  # standard deviations: 95 %
-DISTANCES = (2.0, 4.0, 8.0)  # distances, in standard deviations, at which the others are fitted again, on both sides
-LEAST_STRETCH = 1.1  # errors are only widened by more than this factor, which is the accuracy of these fits
+"""Derivatives are nearly dependent if an eigenvalue of JᵀJ, scaled to a unit diagonal, is smaller. The eigenvalue is
+0.004 for usual steps and 3e-4 along directions that the data leave undetermined."""
+LEAST_DEVIATION = 0.05  # least standard deviation (in a coordinate) of a valley: over less, models are nearly linear
+OPEN_DISTANCES = (1.0, 2.0, 4.0)  # distances, in the coordinate of a parameter that the data leave undetermined
+REACH = 1.96  # half the width of a 95 % interval, in standard deviations
+DISTANCES = (2.0, 4.0, 8.0)  # distances (standard deviations) on both sides at which other parameters are fitted again
+LEAST_STRETCH = 1.1  # errors are widened only if the factor is larger: the fits are not more accurate
 MOST_ITERATIONS, TOLERANCE = 30, 1e-4  # limits of these fits: the rise of the sum of squares is needed to two digits
 
 
@@ -44,11 +44,11 @@ class _Valley:
     Attributes
     ----------
     held : int
-        Index of the coordinate that is held at distances from the minimum.
+        Index of the coordinate that is fixed at distances from the minimum.
     axis : ndarray (p,)
         Changes of all coordinates by one standard deviation along the valley.
     share : ndarray (p,)
-        Share of each coordinate's variance that is along the valley; -1 for times, which samples bound on both sides.
+        Share of each coordinate's variance that is due to the valley; -1 for times, which samples bound on both sides.
     """
 
     held: int
@@ -78,11 +78,11 @@ def along_valleys(
     unit = _unit_of_rise(information, covariance, valley.held)
     reached, near = _reached(plan, comparison, z, bounds, valley, unit)
     known = np.isfinite(np.diag(covariance)) & (valley.share >= 0)
-    part = np.where(known, reached**2 / np.maximum(np.diag(covariance), 1e-300), 0.0)  # of its variance
+    part = np.where(known, reached**2 / np.maximum(np.diag(covariance), 1e-300), 0.0)  # share of the variance
     deviation = float(np.linalg.norm(reached[known]))
     stretch = deviation / float(np.linalg.norm(valley.axis))
     wider = covariance.copy()
-    if stretch >= LEAST_STRETCH:  # one factor for all: different ones would add errors to a - b, or cancel its own
+    if stretch >= LEAST_STRETCH:  # the same factor for all parameters: different factors would falsify errors of a - b
         wider += (stretch**2 - 1) * np.outer(valley.axis, valley.axis)
     if deviation <= UNDETERMINED:
         return wider, (), near
@@ -98,7 +98,8 @@ def along_open(
 ) -> tuple[Array, Array]:  # fmt: skip
     """Covariance (p, p), infinite for parameters that change along an open direction, and points (m, p) on it.
 
-    The model is not linear along the direction. The points fit as well as the minimum.
+    The data do not determine an open direction, and the model is not linear along it. The points fit as well as the
+    minimum.
 
     Parameters
     ----------
@@ -123,7 +124,7 @@ def along_open(
 
 
 def _valley(comparison: DataComparison, information: Array, covariance: Array) -> _Valley | None:
-    """Valley along which a parameter with a finite error is nearly a combination of others; None if there is none."""
+    """Valley along which other parameters nearly compensate a change of a parameter; None if there is no valley."""
     known = np.flatnonzero(np.isfinite(np.diag(covariance)) & (np.diag(information) > 0))
     times = np.array([is_time(one) for one in comparison.space.unknowns])
     if len(known) < 2 or np.all(times[known]):
@@ -144,7 +145,7 @@ def _valley(comparison: DataComparison, information: Array, covariance: Array) -
 
 
 def _unit_of_rise(information: Array, covariance: Array, i: int) -> float:
-    """Rise of the sum of squares at one standard deviation of parameter i, for correlated residuals."""
+    """Rise of the sum of squares one standard deviation of parameter i from the minimum, for correlated residuals."""
     naive = float(np.linalg.pinv(information, rcond=1e-13, hermitian=True)[i, i])
     return float(covariance[i, i]) / max(naive, 1e-300)
 
@@ -153,9 +154,9 @@ def _reached(
     plan: Any, comparison: DataComparison, z: Array, bounds: tuple[Array, Array], valley: _Valley, unit: float,
     distances: tuple[float, ...] = DISTANCES,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Standard deviations (p,) along the valley, from its longer side for each parameter, and points (m, p) in it.
+    """Standard deviations (p,) along the valley, on the longer side for each parameter, and points (m, p) in it.
 
-    The points are within the rise of the sum of squares that corresponds to 95 %.
+    At the points, the sum of squares has risen by no more than corresponds to a 95 % interval.
     """
     away = np.array([side * own for side in (-1.0, 1.0) for own in distances])
     begin = np.clip(z + away[:, None] * valley.axis, *bounds)
@@ -173,10 +174,10 @@ def _reached(
 
 
 def _end(moved: Array, roots: Array) -> Array:
-    """Distances (p,) at which the sum of squares has risen as it should for 95 %, by interpolation.
+    """Distances (p,) at which the sum of squares has risen by as much as at the end of a 95 % interval.
 
-    `moved` (m, p) are distances and `roots` (m,) the roots of the rise there. If the rise is too small at all of them,
-    the valley is assumed to be twice as long as the largest.
+    They are interpolated between the distances `moved` (m, p), at which `roots` (m,) are the square roots of the rise.
+    If the rise is too small even at the largest distance, twice this distance is returned.
     """
     moved, roots = np.vstack([np.zeros(moved.shape[1]), moved]), np.append(0.0, roots)
     beyond = np.flatnonzero(roots >= REACH)

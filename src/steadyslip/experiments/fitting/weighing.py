@@ -1,7 +1,8 @@
 """Weights of the records in a joint fit, from the noise of each record.
 
 With equal weights, records of unequal noise may give larger errors than the quietest record alone (Aitken 1935). The
-scatter of friction from sample to sample gives weights for the search, and the residuals give those of the final fit.
+weights for the search follow from the scatter of friction from sample to sample, the weights of the final fit from the
+residuals.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from steadyslip.experiments.numerics.noise import describe
 from steadyslip.experiments.numerics.splitting import displacement_noise, spread
 
 LEAST_RATIO = 1.3  # records have equal weights below this ratio of noise: weights would reduce errors by 3 % at most
-MOST_RATIO = 100.0  # largest ratio of noise in weights: a noisier record then adds 1e-4 of the information
-MAX_WEIGHINGS = 4  # most estimates of the noise; two usually suffice
+MOST_RATIO = 100.0  # largest ratio of noise in weights; a record with this ratio adds 1e-4 of the information
+MAX_WEIGHINGS = 4  # largest number of times that the noise is estimated; two usually suffice
 ALIKE = 0.1  # weights are final if the noise changes by less than this share: errors then change by less than 0.2 %
 FAR = 4.0  # residuals beyond this number of robust standard deviations are outliers and ignored
 
@@ -37,9 +38,9 @@ def weighed_by_residuals(alike: Plan, plan: Plan, found: SearchResult, effort: E
     alike : Plan
         Plan of two or more records with equal weights.
     plan : Plan
-        Same plan with the weights of the search.
+        The same plan with the weights of the search.
     found : SearchResult
-        Minimum of `plan`, which is followed while weights change.
+        Minimum of `plan`; searches with new weights start at the last minimum.
     effort : Effort
         Limits, with the budget of the whole fit.
     """
@@ -75,7 +76,7 @@ def _weighed(plan: Plan, noise: Array) -> Plan:
 
 
 def _noise(plan: Plan, found: SearchResult) -> Array:
-    """Standard deviation (records,) of the noise of slow changes, from residuals with the weights of the plan."""
+    """Standard deviation (records,) of white noise equivalent to the noise of residuals weighted as in the plan."""
     one, weights = found.comparison, np.concatenate(_weights(plan))
     predicted, jacobian = (own[0] for own in one.model(found.coordinates[None]))
     residuals, rows = (one.data - predicted) * weights, jacobian * weights

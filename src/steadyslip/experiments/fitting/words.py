@@ -32,11 +32,11 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
 
 MAX_END_OFFSET = 3.0  # an end is off the model if its mean residual exceeds this multiple of the record's rms residual
-END_SAMPLES = 5  # number of first or last residuals in that mean; also one in two hundred, if that is more
-UNLIKE = 0.1  # weights of records are printed from this relative difference, which averaging does not reach
-OVERSHOOT = 0.01  # least overshoot of a servo that is mentioned, as a share of the step
+END_SAMPLES = 5  # least number of first or last residuals in this mean; of long records, one residual in 200 is taken
+UNLIKE = 0.1  # weights of records are printed if they differ by more than this share; averaging changes them by less
+OVERSHOOT = 0.01  # smallest overshoot of a servo that is mentioned, as a share of the step
 MAX_JUMP_ERROR = 0.1
-"""Errors are not Gaussian if the time of a jump has a larger standard deviation, in sampling intervals."""
+"""Errors are not Gaussian if the standard deviation of the time of a jump is larger, in sampling intervals."""
 
 
 def words(fit: FitNumbers) -> str:
@@ -90,7 +90,7 @@ def _quality(fit: FitNumbers) -> list[str]:
 
 
 def _range_of_weakening(fit: FitNumbers) -> list[str]:
-    """Line on the slip after changes of rate, as a - b is only known for less slip; no line without an a - b."""
+    """Line on the largest slip after a change of rate, up to which a - b is known; no line without an a - b."""
     slip = slip_after_changes(fit)
     if not slip or all(one.name.partition("@")[0] != WEAKENING for one in fit.derived):
         return []
@@ -99,9 +99,10 @@ def _range_of_weakening(fit: FitNumbers) -> list[str]:
 
 
 def slip_after_changes(fit: FitNumbers) -> float:
-    """Longest displacement (m) of a load point from a change of its rate to the next change or the end; 0 without one.
+    """Longest displacement (m) of a load point from a change of its rate to the next change or the end of the record.
 
-    A state with a longer slip distance hardly evolves in the records, so that a - b of the fit does not include it.
+    It is 0 without a change. A state with a longer slip distance hardly evolves in the records, so that a - b of the
+    fit does not include its effect.
     """
     longest = 0.0
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
@@ -131,9 +132,9 @@ def _left_out(fit: FitNumbers) -> list[str]:
 
 
 def warnings(fit: FitNumbers) -> list[str]:
-    """Warnings on a fit, each a sentence, that a reader must know before using the numbers.
+    """Sentences with warnings that a user must know before using the numbers of a fit.
 
-    A better model comes first; if it leaves only noise, warnings on times at their bounds are omitted, as the better
+    A better model is named first. If it leaves only noise, warnings on times at their bounds are omitted, as the better
     model removes their cause.
     """
     best = better(fit)
@@ -211,7 +212,7 @@ def _possible_ramps(fit: FitNumbers) -> list[str]:
     if found and fit.as_ramps:
         moved = [abs(one.values[n] - fit.values[n]) > fit.errors[n] for one in _alike(fit, fit.as_ramps)
                  for n in _steep_names(fit.rig(0)) if n in one.values and n in fit.values]  # fmt: skip
-        if not any(moved):  # by more than its error
+        if not any(moved):  # ramps change no parameter by more than its error
             return []
         found[-1] += f"; {_ramp_effect(fit, fit.as_ramps)}"
     return found
@@ -228,7 +229,7 @@ def _ramp_effect(fit: FitNumbers, tried: tuple[RampFit, ...]) -> str:
 
 
 def better(fit: FitNumbers) -> Remedy | None:
-    """Best of the other models that fit the records better by strong evidence; None if there is none."""
+    """Best of the models in `remedies` that fit better by strong evidence; None if no model does."""
     return next((one for one in fit.remedies if one.gain >= STRONG_EVIDENCE), None)
 
 
@@ -263,7 +264,7 @@ def _structure(fit: FitNumbers) -> list[str]:
 
 
 def _near(fit: FitNumbers, best: Remedy) -> list[Remedy]:
-    """Other models between which and the best one the records hardly distinguish."""
+    """Models in `remedies` that the records hardly distinguish from the best model."""
     return [one for one in fit.remedies if one is not best and best.gain - one.gain < STRONG_EVIDENCE <= one.gain]
 
 
@@ -278,7 +279,7 @@ def _as_slow_state(fit: FitNumbers, one: Remedy) -> str:
 
 
 def _rivals(fit: FitNumbers, best: Remedy) -> str:
-    """Clause on other models between which and the best one the records hardly distinguish."""
+    """Clause on models that the records hardly distinguish from the best model; empty if there are none."""
     near = _near(fit, best)
     said = [
         f"{_asked(fit, one)} (BIC {abs(best.gain - one.gain):.1f} {'less' if one.gain > best.gain else 'more'}, "
@@ -289,7 +290,7 @@ def _rivals(fit: FitNumbers, best: Remedy) -> str:
 
 
 def _consequence(fit: FitNumbers, best: Remedy) -> str:
-    """Clause on the use of the fitted values, depending on whether a better model moves one by more than its error."""
+    """Clause that says whether to use the fitted values: only if the better model changes them by less than errors."""
     choices = [one.choice for one in (best, *_near(fit, best))]
     if all(any(f"fit.{word} =" in choice for choice in choices) for word in ("trend", "states")):
         return (
@@ -322,7 +323,7 @@ def _asked(fit: FitNumbers, one: Remedy) -> str:
 
 
 def _moved(fit: FitNumbers, one: Remedy) -> list[str]:
-    """Relative changes of the parameters of the law and of the stiffness, and a − b compared with that of the fit."""
+    """Relative changes of the law's parameters and the stiffness in another model, and its a − b beside the fit's."""
     own = weakening(fit.rig(0), fit.values)
     levels = [] if own is None or WEAKENING not in one.values else [
         f"{WEAKENING} {one.values[WEAKENING]:.2g} in place of {own:.2g}"
@@ -331,7 +332,7 @@ def _moved(fit: FitNumbers, one: Remedy) -> list[str]:
 
 
 def _shares(fit: FitNumbers, one: Remedy) -> list[str]:
-    """Relative changes of the parameters of the law and of the stiffness."""
+    """Relative changes of the parameters of the law and of the stiffness in another model."""
     return [f"{_symbol(n)} {one.values[n] / fit.values[n] - 1:+.0%}" for n in _steep_names(fit.rig(0))
             if n in one.values and fit.values.get(n)]  # fmt: skip
 
@@ -352,7 +353,7 @@ def _equal_memories(fit: FitNumbers) -> str:
 
 
 def _open_memory(fit: FitNumbers) -> list[str]:
-    """Warning with advice on how to determine a memory of normal stress that the records leave open."""
+    """Warning with advice on how to determine a memory of normal stress that the records do not determine."""
     lost = {name for one in fit.unidentified for name in one.weights if "normal_memory." in name}
     if not lost:
         return []
@@ -447,7 +448,7 @@ def drive_line(fit: FitNumbers) -> str:
 
 
 def _servo(course: Course) -> str:
-    """Clause on how the load point follows the changes of a course; empty for steps and ramps."""
+    """Clause on the response of the load point to its commanded changes; empty for steps and ramps."""
     if any(change.pieces for change in course.changes):
         return (
             "; around changes the load point moves as measured, in straight pieces of its rate, because the "
@@ -463,7 +464,7 @@ def _servo(course: Course) -> str:
 
 
 def _steep_names(rig: Slider) -> tuple[str, ...]:
-    """Names of the parameters on which noise of a displacement has most effect."""
+    """Names of the parameters on which noise of a displacement has the largest effect: a, b and stiffness."""
     kinds = ("direct effect", "evolution effect", "stiffness")
     return tuple(name for kind in kinds for name in rig.of_kind(kind))
 

@@ -1,4 +1,4 @@
 """Fits of machines to records of their motions, forces and frequency responses.
 
-The comparison, the least-squares search and the errors are those of all fits; there is no commanded loading.
+Comparison, least-squares search and errors are computed as in fits of sliders; there is no commanded loading.
 """

@@ -21,8 +21,8 @@ from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, minimise
 from steadyslip.machine.machine import Machine
 
-MAX_WEIGHINGS = 8  # most estimates of the columns' scatter; three usually suffice
-ALIKE = 0.02  # a smaller relative change of the scatter makes no difference to the estimates
+MAX_WEIGHINGS = 8  # largest number of times that the scatter of the columns is estimated; three usually suffice
+ALIKE = 0.02  # weights are final if the scatter changes by a smaller share: the estimates then change no more
 
 
 def fit_machine(
@@ -31,7 +31,7 @@ def fit_machine(
 ) -> MachineFit:  # fmt: skip
     """Fit of a machine to records; see `steadyslip.fit`.
 
-    Columns hold different quantities; each is weighted by its noise, which is estimated from its residuals.
+    As columns hold different quantities, each column is weighted by its noise, which is estimated from its residuals.
     """
     plan = make_machine_plan(machine, records, free, errors=errors, starts=starts, effort=effort, **options)
     space = plan.space()
@@ -57,7 +57,7 @@ def fit_machine(
 
 
 def _scatter(plan: MachinePlan, comparison: MachineComparison, z: Array) -> tuple[float, ...]:
-    """Standard deviation of each series about the model, in SI units; at least the error of the integration."""
+    """Standard deviation of each series about the model, in SI units; at least the error of numerical integration."""
     r = (comparison.data - comparison.model(z[None])[0][0]) * comparison.weights
     before = plan.scatter or tuple(one.size for one in plan.series)
     return tuple(

@@ -26,11 +26,11 @@ from steadyslip.motion.targets import targets
 from steadyslip.protocol import Protocol
 
 STEP = 1e-4
-"""Step of finite differences in coordinates (e-folds or natural sizes). An integration error of 1e-9 of the motion
-causes an error of 1e-5 in a derivative; for a ring-down of 50 periods, the truncation error is as large."""
+"""Step of central differences in coordinates (ln of a positive parameter, or value over size). An integration error of
+1e-9 of the motion causes an error of 1e-5 in a derivative; for a ring-down of 50 periods, truncation causes as much."""
 ROUGH_STEP = 1e-3  # step of one-sided differences of motions that are integrated with a large tolerance
-TIME_SPAN = 10.0  # range of the search for a time of the protocol, in hundredths of the record
-SPAN = 1e4  # range of the search for a parameter: this factor on both sides of the machine's value
+TIME_SPAN = 10.0  # a time of the protocol is searched within this many hundredths of the record on both sides
+SPAN = 1e4  # a parameter is searched from the machine's value over this factor to this multiple of the value
 
 Model = Callable[[Mapping[str, Array], Mapping[str, Array], int], Array]
 
@@ -87,7 +87,7 @@ class MachinePlan:
         return tuple(one for i, record in enumerate(self.records) for one in series_of(i, record, self.units))
 
     def known(self) -> dict[str, Address]:
-        """Parameters that may be free, by dotted name: those with a value, and with an effect on the motion."""
+        """Parameters that may be free, by dotted name: they have a value, and an effect on the motion."""
         found = dict(self.rig.parameters())
         if self.protocol is not None:
             found |= parameters(self.protocol, "protocol.")
@@ -137,7 +137,7 @@ class MachinePlan:
 
     @cached_property
     def _starts(self) -> dict[str, tuple[float, float]]:
-        """Natural size, and value in steady sliding, of each displacement and velocity with a free initial value."""
+        """Typical size, and value in steady sliding, of each displacement and velocity with a free initial value."""
         model = self._point.model
         scales, _ = natural_scales(self._point, reduce_model(model, None))
         items = [item for item in model.variables if item.kind in ("slip", "velocity")]
@@ -148,9 +148,9 @@ class MachinePlan:
         }
 
     def begins(self, space: Space, steadily: bool = False) -> Array:
-        """Search coordinates (p,) of the machine's parameter values.
+        """Coordinates (p,) from which a search starts: those of the machine's parameter values.
 
-        Unknown initial states are those of the record's first sample or, with `steadily`, of steady sliding.
+        Unknown initial states start at the first sample of the record or, if `steadily` is true, at steady sliding.
         """
         known, values = self.known(), []
         for one in space.unknowns:
@@ -164,7 +164,7 @@ class MachinePlan:
         return np.asarray(space.coordinates(np.array(values)))
 
     def ends(self, space: Space) -> tuple[Array, Array]:
-        """Lower and upper bounds (p,) of the search in coordinates: by the domain, and by `SPAN` and `TIME_SPAN`."""
+        """Lower and upper bounds (p,) of the search in coordinates, from domains, `SPAN` and `TIME_SPAN`."""
         times = [one.parameter.startswith("protocol.") and one.unit == "s" for one in space.unknowns]
         reach = np.array([np.log(SPAN) if one.logarithmic else SPAN for one in space.unknowns])
         reach[times] = TIME_SPAN
@@ -192,7 +192,7 @@ class MachineComparison(DataComparison):
     models : list of callable
         Model of each record.
     rough : bool
-        True for one-sided differences.
+        True for derivatives from one-sided instead of central differences.
     """
 
     def __init__(self, plan: MachinePlan, models: list[Model], rough: bool = False) -> None:
@@ -256,9 +256,9 @@ class MachineComparison(DataComparison):
 
 
 def _smooth_slopes(forward: Array, backward: Array) -> Array:
-    """Means of one-sided derivatives (m, p, n), or the smaller one if they differ much.
+    """Means of forward and backward derivatives (m, p, n), or the smaller of the two if they differ much.
 
-    If a motion begins to stick, or ends, on one side of a point, the difference on that side is no derivative.
+    If a motion begins to stick, or ends early, on one side of a point, the difference on this side is no derivative.
     """
     sizes = [np.linalg.norm(one, axis=2) for one in (forward, backward)]
     sizes = [np.where(np.isfinite(one), one, np.inf) for one in sizes]

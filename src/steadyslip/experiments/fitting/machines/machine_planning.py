@@ -19,7 +19,7 @@ from steadyslip.machine.responses import ResponseData
 from steadyslip.protocol import Protocol
 
 OF_SLIDERS = ("drive", "trend_axis", "lag", "loss", "width", "calibrated", "states", "compare", "windows", "weights")
-"""Options of fits of sliders that fits of machines do not have."""
+"""Options that only fits of sliders have."""
 
 
 def make_machine_plan(
@@ -86,7 +86,7 @@ def make_machine_plan(
 
 
 def _of_motion(plan: MachinePlan, record: MotionRecord, where: str) -> list[Problem]:
-    """Problems with the columns of a record, and with what moves the machine in it."""
+    """Problems with the columns of a record, and with a protocol that is missing or starts after the record."""
     found = []
     for name, written in record.units.items():
         if name not in plan.units:
@@ -107,7 +107,7 @@ def _of_motion(plan: MachinePlan, record: MotionRecord, where: str) -> list[Prob
 
 
 def _of_response(plan: MachinePlan, record: ResponseData, where: str) -> list[Problem]:
-    """Problems with a frequency response: names of its ends, gaps, and a frequency of 0."""
+    """Problems with a frequency response: unknown names, missing values, and a frequency of 0."""
     known = [name for name in plan.units if name.endswith(".x")]
     ends = [name.removesuffix(".x").replace(".normal", ".y") for name in known]
     ends = [end if end.endswith(".y") else f"{end}.x" for end in ends]

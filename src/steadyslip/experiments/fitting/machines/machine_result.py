@@ -29,7 +29,7 @@ class MachineFit(Fitted):
     Attributes
     ----------
     plan : MachinePlan
-        Machine, records and options of the fit. The other attributes are those of a `Fit`.
+        Machine, records and options of the fit. Other attributes are as for `Fit`.
     """
 
     plan: MachinePlan
@@ -56,7 +56,7 @@ class MachineFit(Fitted):
         }
 
     def rig(self, record: int = 0) -> Machine:
-        """Machine with the fitted values; those of `record` if values differ between records."""
+        """Machine with the fitted values; if values differ between records, with the values of `record`."""
         known = self.plan.rig.parameters()
         return self.plan.rig.with_values({
             one.parameter: self.values[one.name]
@@ -101,7 +101,7 @@ def _words(fit: MachineFit) -> str:
 
 
 def _warnings(fit: MachineFit) -> list[str]:
-    """Warnings, each a sentence, that a reader must know before using the numbers."""
+    """Sentences with warnings that a user must know before using the numbers of a fit."""
     found = fitted_warnings(fit)
     seen = any(rms > np.sqrt(EXACT) * one.size for rms, one in zip(fit.scatter.values(), fit.plan.series, strict=True))
     if seen and fit.whiteness.p < STRUCTURE:

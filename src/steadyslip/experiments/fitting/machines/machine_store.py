@@ -120,7 +120,7 @@ def _record(
 
 
 def _plan(table: ExpectedTable, records: list[Any], options: dict[str, Any]) -> MachinePlan:
-    """Plan from the options of the file, which are checked like user input."""
+    """Plan from the options in a file, which are checked like user input."""
     from steadyslip.files.specifications import protocol_from_text, rig_from_text
 
     text, source = table.attributes["rig"], str(table.path)

@@ -1,9 +1,9 @@
 """Search for the least sum of squares in a fit of a machine, starting at the machine's parameters and around them.
 
-The sum of squares has many local minima: a model frequency that is off by more than one period over a ring-down, or by
-more than the width of a peak, is not corrected. Therefore each start is first fitted to a short beginning of the
-motions, then to a longer one, and to the logarithm of responses. A weak penalty on the distance from the start keeps
-parameters that a beginning does not determine.
+The sum of squares has many local minima: a search does not correct a model frequency that is off by more than one
+period over a ring-down, or by more than the width of a peak. Therefore each start is first fitted to a short beginning
+of the motions, then to a longer beginning, and to the logarithm of responses. A weak penalty on the distance from the
+start keeps parameters that a beginning does not determine near their start.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from steadyslip.experiments.measured.motion_record import MotionRecord
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, MERGE_DISTANCE, SAME_SSQ, Minima, minimise
 
 BEGINNINGS = (1 / 16, 1 / 4)
-"""Shares of a record that are fitted first: a frequency found in one is precise enough for four times its length.
-Without them, fits to ring-downs of 60 and 120 periods took 1.3 to 6 times as long."""
-FEWEST_FOLLOWED = 10  # least number of samples of such a part
+"""Shares of a record that are fitted before the whole record: a frequency found in a part is precise enough to fit four
+times its length. Without these parts, fits to ring-downs of 60 and 120 periods took 1.3 to 6 times as long."""
+FEWEST_FOLLOWED = 10  # least number of samples in such a part
 MOST_ITERATIONS = 100  # most iterations on whole records; longer searches are in a valley that the record leaves open
-ROUGH_RTOL = 1e-6  # relative tolerance of motions in the first parts
-ROUGH_HOPE = 100.0  # fits to a first part are dropped above this multiple of the best sum of squares
-HELD_BACK = 1e-4  # penalty for an e-fold from the start: this mean square of residuals over the size of their series
+ROUGH_RTOL = 1e-6  # relative tolerance of the integration in the first parts
+ROUGH_HOPE = 100.0  # fits to a first part with more than this multiple of the best sum of squares are dropped
+HELD_BACK = 1e-4  # penalty for a change of a parameter by e: as much as this mean square of relative residuals
 ELSEWHERE, RISE = 0.1, 2.0
-"""Two minima differ if they are farther apart than this (e-folds or natural sizes) and the sum of squares halfway
-between them is at least this multiple of theirs."""
-SPREAD = 1.15  # largest distance of a start from the machine's parameters, e-folds: a factor of three
+"""Two minima are different if they are farther apart than the first number in a coordinate, and if the sum of squares
+halfway between them exceeds theirs by at least the second number as a factor."""
+SPREAD = 1.15  # largest distance of a start from the machine's parameters, in ln(parameter): a factor of three
 
 
 class FirstPart:
-    """Residuals of the first part of all motions of a plan, and of the logarithm of its responses.
+    """Residuals of the first part of all motions in a plan, and residuals of the logarithm of its frequency responses.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def _of_logarithms(data: Array, predicted: Array, slopes: Array) -> tuple[Array,
 
 
 def _disturbed(plan: MachinePlan, record: MotionRecord) -> float:
-    """Time (s) of the first disturbance of a motion; the first sample if the protocol has none."""
+    """Time (s) of the first disturbance of a motion, or of its first sample if the protocol has no disturbance."""
     times = [float(getattr(piece, "at", 0.0) or 0.0) for piece in (plan.protocol.pieces if plan.protocol else ())]
     first = float(record.time[0])
     return first if plan.initial == "free" or not times else float(np.clip(min(times), first, record.time[-1]))
@@ -118,8 +118,8 @@ def find_near(
 ) -> tuple[Array, SearchSummary, MachineComparison]:
     """Best-fit coordinates (p,), the summary of the search, and the comparison with the records.
 
-    The first start has the machine's parameters. More follow, up to `starts`, until `MIN_ARRIVED` of them have reached
-    the best minimum.
+    The first start has the machine's parameters. Further starts follow, up to `starts` in all, until `MIN_ARRIVED`
+    starts have reached the best minimum.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def find_near(
             )  # fmt: skip
             here, which = _hopeful(ends)
             counts = np.array([np.sum(counts[which == k]) for k in range(len(here))], dtype=int)
-        if not tried:  # the machine's parameters may be near, and first parts mislead if a time is free
+        if not tried:  # the machine's parameters may be near a minimum, and first parts mislead if a time is free
             here, counts = np.concatenate([here, begin[:1]]), np.append(counts, 1)
         tried = upto
         ends = minimise(
@@ -178,17 +178,17 @@ def find_near(
 
 
 def _is_another(whole: MachineComparison, found: Minima, most: float) -> bool:
-    """True if another minimum is as good as the first and separated from it by a rise of the sum of squares."""
+    """True if another minimum is as good as the first, and the sum of squares is larger between the two."""
     alike = found.coordinates[found.converged & (found.ssq <= most)]
     far = alike[np.max(np.abs(alike - found.coordinates[0]), axis=1, initial=0.0) > ELSEWHERE]
     return bool(len(far)) and bool(np.any(whole.misfit(0.5 * (far + found.coordinates[0])) > RISE * most))
 
 
 def _hopeful(ends: Minima) -> tuple[Array, Array]:
-    """Distinct end points (k, p) that may lead to the best minimum, and index (m,) of the one that each end is near.
+    """Distinct end points (k, p) that may lead to the best minimum; for each of m ends, index of the point near it.
 
-    The index is -1 for ends that are dropped. If no sum of squares could be computed, all ends are kept, as a longer
-    part may be computable.
+    The index is -1 for an end that is dropped. If no sum of squares could be computed, all ends are kept, as the sum
+    over a longer part may be computable.
     """
     if not np.any(np.isfinite(ends.ssq)):
         return ends.coordinates, np.arange(len(ends.ssq))
@@ -208,5 +208,5 @@ def _starts(plan: MachinePlan, whole: MachineComparison, count: int) -> Array:
     grid = qmc.Halton(len(own), rng=12345).random(count)
     grid[0] = 0.5
     found = own + (2 * grid - 1) * spread
-    found[1::2] += plan.begins(whole.space, steadily=True) - own  # a noisy first sample may allow no motion
+    found[1::2] += plan.begins(whole.space, steadily=True) - own  # the noisy first sample may be no possible state
     return np.asarray(np.clip(found, whole.low, whole.high))

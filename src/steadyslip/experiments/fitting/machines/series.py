@@ -21,10 +21,10 @@ from steadyslip.motion import simulate_many
 from steadyslip.protocol import Protocol
 
 PUSH = ".push"
-EXACT = 1e-12  # mean square of residuals over the size of their series that is due to integration errors alone
+EXACT = 1e-12  # mean square of residuals, over the squared size of their series, that integration errors alone cause
 STEPS_PER_SAMPLE, FEWEST_STEPS = 200, 20_000
-"""A simulation is stopped after these steps per sample, plus a fixed number: stick-slip between two samples takes some
-tens of steps."""
+"""A simulation is stopped after the first number of steps per sample plus the second number: stick-slip between two
+samples takes some tens of steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class MachineSeries(ReadOnly):
 
     @property
     def size(self) -> float:
-        """Scale of the residuals before their scatter is known: standard deviation of the data, or largest value."""
+        """Assumed size of residuals until their scatter is known: standard deviation of the data, or largest value."""
         return float(np.std(self.data)) or float(np.max(np.abs(self.data))) or 1.0
 
 
@@ -71,7 +71,7 @@ def pairs_of(data: ResponseData) -> list[tuple[int, int]]:
 
 
 def series_of(index: int, record: MotionRecord | ResponseData, units: Mapping[str, str]) -> list[MachineSeries]:
-    """Series of a record; `units` are those of the machine's observables."""
+    """Series of a record; `units` has the SI units of the quantities that a simulated run contains."""
     if isinstance(record, MotionRecord):
         even = np.ones(len(record))
         return [MachineSeries(index, n, units[n], record.time, values, even) for n, values in record.columns.items()]
@@ -95,7 +95,7 @@ class MotionModel:
     ----------
     rig : Machine
     protocol : Protocol or None
-        Its times are those of the record; without a protocol the motion begins at the first sample.
+        Protocol on the clock of the record; without a protocol, the motion begins at the first sample.
     record : MotionRecord
     rtol : float
     effort : Effort

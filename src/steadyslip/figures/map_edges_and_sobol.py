@@ -82,7 +82,7 @@ def sensitivity(found: Sensitivity, ax: Any = None) -> Any:
     ----------
     found : Sensitivity
     ax : matplotlib.axes.Axes or sequence of them, optional
-        One for each result.
+        One Axes for each result.
 
     Returns
     -------

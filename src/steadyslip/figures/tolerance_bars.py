@@ -21,7 +21,8 @@ WORDS = {True: "stable throughout", False: "unstable throughout", None: "stable 
 def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
     """Plot ranges of the safety factor (stiffness over critical stiffness), or of the growth rate, within tolerances.
 
-    One bar for each parameter varied alone, one for all together. Growth rates are drawn if `found.along` is empty.
+    There is one bar for each parameter varied alone, and one for all parameters together. Growth rates are drawn if
+    `found.along` is empty.
 
     Parameters
     ----------

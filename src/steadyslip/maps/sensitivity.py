@@ -39,11 +39,11 @@ class Sensitivity(ReadOnly):
     ranges : dict of str to (float, float, str)
         Ends in SI units, and spacing ``linear`` or ``log``.
     first, total : dict of str to ndarray (d,)
-        By result: share of the variance due to each parameter alone, and together with its interactions.
+        By name of the result: share of the variance due to each parameter alone, and together with its interactions.
     first_interval, total_interval : dict of str to ndarray (2, d)
         95 % bootstrap intervals of the shares.
     missing : dict of str to float
-        By result: share of the points without a value; their sets are left out of the indices.
+        By name of the result: share of the points without a value; sets with such points are left out of the indices.
     points : dict of str to int
         Number of sets of points used, each of d + 2 evaluations.
     interrupted : bool

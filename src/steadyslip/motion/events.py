@@ -106,7 +106,7 @@ class ContactEvent(Displayed):
     velocity : float
         Slip rate, m/s.
     normal_force, friction_force, pull : float
-        N; `pull` is the spring force that the contact law takes (its stress T times the area).
+        N; `pull` is the spring force on which the contact law depends (the stress T times the area).
     slip : float
         Distance slipped since the start of the run, m.
     """

@@ -56,16 +56,16 @@ class FrozenVerdicts(ReadOnly):
     labels : dict of str to str
         Display names of the parameters in `values`: their names, or ``effective normal stress``.
     growth_rate : ndarray (n,)
-        Of the leading eigenvalue, 1/s; NaN where there is no steady sliding.
+        Growth rate of the leading eigenvalue, 1/s; NaN where there is no steady sliding.
     critical_stiffness : ndarray (n,)
-        Of a slider, Pa/m; NaN where there is none, and for machines.
+        Critical stiffness of a slider, Pa/m; NaN where there is none, and for machines.
     crossings : tuple of (float, str)
-        Times (s) at which the verdict changes, each with the new one: ``unstable``, ``stable`` or ``no steady
+        Times (s) at which the verdict changes, each with the new verdict: ``unstable``, ``stable`` or ``no steady
         sliding``.
     departure : float
         First time (s) after sliding became unstable at which slip is twice as fast as commanded and twice as fast as
-        when it became unstable (a ramp of the load by itself slows or speeds up slip), or at which motion cannot go
-        on; NaN if there is none.
+        when sliding became unstable (a ramp of the load by itself slows or speeds up slip), or at which motion cannot
+        go on; NaN if there is no such time.
     e_folds : float
         Growth of a small disturbance between loss of stability and departure: integral of the growth rate.
     """

@@ -128,7 +128,7 @@ class Protocol(FrozenRecord):
         Parameters
         ----------
         changes : mapping of str to array_like
-            By dotted name such as ``protocol.pieces.1.to``, in SI units.
+            Arrays of values (SI units) by dotted name, such as ``protocol.pieces.1.to``.
 
         Raises
         ------

@@ -116,7 +116,7 @@ def pack(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, ...
     Parameters
     ----------
     protocol : Protocol
-        Its numbers may be 1-D arrays with one value for each lane, see `records.with_values`.
+        Numbers in the protocol may be 1-D arrays with one value for each lane, see `records.with_values`.
     velocity : float or 1-D array
         Velocity of the rig's drive, m/s.
     until : float or 1-D array

@@ -219,9 +219,9 @@ def compare_rigs(
     ----------
     first, second : Slider or Machine
     tolerances : (tolerances, tolerances), optional
-        Of the first and the second rig, as for `tolerate`. Those read from files may have intervals of unknown
-        parameters: parts and verdicts are then over values tried in these; an interval common to both rigs is one
-        unknown, with equal values in both.
+        Tolerances of the first and of the second rig, as for `tolerate`. Tolerances read from files may have intervals
+        of unknown parameters: parts and verdicts are then over values tried in these intervals; an interval common to
+        both rigs is one unknown, with equal values in both.
     names : (str, str), optional
         Names of the rigs in the text.
 

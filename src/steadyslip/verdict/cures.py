@@ -66,18 +66,18 @@ class Cures(ReadOnly):
     chance, error : float
         Chance of the rig as it is, and half-width of its 95 % interval; 0 or 1 and 0 without tolerances.
     windows : tuple of Window
-        One for every adjustable parameter, in the order of the file or of `default_adjust`.
+        One window for every adjustable parameter, in the order of the file or of `default_adjust`.
     pair : dict of str to float
         Values of the two parameters that, changed together, cost least, SI units; empty if a single change costs no
         more, or if no pair reaches the chance.
     pair_cost : float
         Cost of `pair`; infinite if it is empty.
     fails : tuple of Window
-        For a rig that has the chance as it is: one for every parameter whose change would lose it, the smallest such
-        change first.
+        For a rig that has the required chance as it is: one window for every parameter whose change would lose the
+        chance, the smallest change first.
     unlisted : tuple of Window
-        If no adjustable parameter reaches the chance: one for every other parameter that a designer chooses, in the
-        order of `default_adjust`.
+        If no adjustable parameter reaches the chance: one window for every other parameter that a designer chooses, in
+        the order of `default_adjust`.
     without_tolerances : bool
         True if nothing of the rig varies: results are then for the rig's own values, whatever chance is required.
     unknown : tuple of ValuesWithin

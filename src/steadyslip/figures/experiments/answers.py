@@ -217,7 +217,7 @@ def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
     ----------
     result : Prediction
     ax : array of matplotlib Axes, optional
-        One for each kind of kick.
+        One Axes for each kind of kick.
 
     Returns
     -------

@@ -26,7 +26,7 @@ def population(result: Population, ax: Any = None) -> np.ndarray:
     ----------
     result : Population
     ax : array of matplotlib Axes, optional
-        One for each parameter, and a - b, in a row.
+        One Axes for each parameter, and one for a - b, in a row.
 
     Returns
     -------

@@ -101,7 +101,7 @@ def calculix_matrices(name: str, names: bytes, contents: Mapping[str, tuple[str,
     name : str
         File of the names of the degrees of freedom.
     names : bytes
-        Its content: a line such as ``105.1`` for each row.
+        Content of this file: a line such as ``105.1`` for each row.
     contents : mapping of str to (str, bytes)
         Name and content of the file of each letter: lines ``row column entry`` of one triangle.
 
@@ -130,7 +130,7 @@ def nastran_matrices(path: str, file: Path, content: bytes) -> NamedMatrices:
         Name for messages.
     file : Path
     content : bytes
-        Its content.
+        Content of the file.
 
     Raises
     ------

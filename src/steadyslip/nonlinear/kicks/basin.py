@@ -60,7 +60,7 @@ class Basin(ReadOnly):
     doubt : ndarray of str (m, n)
         Reason for which a point is undecided; else empty.
     cycles : tuple of History
-        One period of each unstable cycle of this rig that was found; with two state variables it bounds the basin.
+        One period of each unstable cycle of this rig that was found; with two state variables, it bounds the basin.
     names : tuple of str
         Variables of the plane: ``x`` and ``v``; for a machine a body's displacement and velocity, or without mass a
         memory variable of a contact.
@@ -135,7 +135,8 @@ def basin(
         first memory variable of a slider follows from it; for a machine `v` is the memory variable itself. All other
         variables start as in steady sliding.
     at : str, optional
-        Body of a machine whose plane it is; by default the one whose contact moves most in the leading mode.
+        Body of a machine to whose motion the plane belongs; by default the body whose contact moves most in the leading
+        mode.
     along : str, optional
         Parameter along which unstable cycles of this rig are searched for; by default the stiffness of a slider. For a
         machine cycles are searched for only if it is given.

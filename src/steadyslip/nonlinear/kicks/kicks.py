@@ -128,12 +128,12 @@ class Kicked:
     kick : str
         A key of ``kicks_of(rig)``.
     at : str or None
-        Of a machine: the body or contact that is kicked; None for its drive.
+        For a machine: the body or contact that is kicked; None for its drive.
     direction : int
         1: faster, forward, pressed harder; -1: the reverse.
     reference : str
-        For ``velocity``: ``before`` if the rig's drive velocity is that before the step, ``after`` if it is that after
-        it. The rig's parameters, such as a steady normal stress, refer to its drive velocity.
+        For ``velocity``: ``before`` if the rig's drive velocity is the velocity before the step, ``after`` if it is the
+        velocity after the step. The rig's parameters, such as a steady normal stress, refer to its drive velocity.
     vary : mapping of str to ndarray
         Parameters of the rig, flat arrays of equal length.
     up_to : float or None
@@ -146,7 +146,8 @@ class Kicked:
     rest : Rest
         Steady sliding of the rigs before kicks.
     exists, neutral, stable : ndarray of bool (size,)
-        True if steady sliding exists; if small motions about it neither grow nor decay; if they do not grow.
+        True if steady sliding exists; if small motions about steady sliding neither grow nor decay; and if these
+        motions do not grow.
     budget : StepBudget
         Integration steps left for all motions.
     """

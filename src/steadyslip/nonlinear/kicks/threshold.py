@@ -81,15 +81,15 @@ class Threshold(Displayed):
         True if the bracket is as narrow as `precision`. If not, kicks inside it were simulated for the longest time
         allowed without a certain outcome.
     interrupted : bool
-        True if Ctrl-C ended the search; the bracket is that reached by then.
+        True if Ctrl-C ended the search; the bracket is as narrow as reached by then.
     doubt : str
-        Reason for which kicks inside the bracket, or beyond it, are undecided; empty if none is.
+        Reason for which kicks inside the bracket, or beyond it, are undecided; empty if there are no such kicks.
     survived : float
         Lower end of the bracket in SI units, as `amount`: all smaller kicks that were simulated return.
     at : str
-        Of a machine: the body or contact that is kicked; empty for its drive.
+        For a machine: the body or contact that is kicked; empty for its drive.
     contact : str
-        Of a machine: the contact that is lost just beyond, or fastest in a blow-up; else empty.
+        For a machine: the contact that is lost after a slightly larger kick, or the fastest in a blow-up; else empty.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -206,7 +206,7 @@ def threshold(
         ``displacement`` of the drive, or with `at` of a body; ``force`` (a step) and ``impulse`` on a body;
         ``normal-force`` (a step) at a contact.
     at : str, optional
-        Of machines: the body or contact.
+        For machines: the body or contact that is kicked.
     direction : int, optional
         1: faster, forward, pressed harder; -1: the reverse.
     reference : str, optional
@@ -281,7 +281,7 @@ class _Search:
     low, high : float
         Largest size up to which all kicks return, and smallest known not to (inf if none).
     outcome : int
-        Index into `OUTCOMES` of the kick `high`; without one, of the smallest undecided kick, or `RETURNS`.
+        Index into `OUTCOMES` of the kick `high`; if no kick fails, of the smallest undecided kick, or `RETURNS`.
     doubt : int
         Index into `OUTCOMES` of the smallest undecided kick inside the bracket; `RETURNS` if there is none.
     """
@@ -422,7 +422,7 @@ class KickMargin(Displayed):
         The protocol piece.
     threshold : Threshold
     ratio : float
-        Size of the threshold over that of the step, for velocities sizes ln(v/v₀); NaN without a threshold.
+        Size of the threshold over that of the step; for velocities sizes are ln(v/v₀). NaN without a threshold.
     outcome : str
         Outcome of the step itself: ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution`` or
         ``undecided``. Steps beyond the threshold may return too.

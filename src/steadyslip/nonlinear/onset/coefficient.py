@@ -36,13 +36,13 @@ class Cubic:
     Attributes
     ----------
     c1 : ndarray (m,)
-        Growth rate of the amplitude per squared amplitude of ln v at `contact`, 1/s; NaN beyond floating point.
+        Growth rate of the amplitude per squared amplitude of ln v at `contact`, 1/s; NaN if beyond floating point.
     error : ndarray (m,)
         Bound of the change of c1 by rounding of the rig's numbers and in the computation, 1/s.
     share : ndarray (m,)
         |c1| over the sum of the absolute values of its terms; small where they cancel.
     stress_ratio : ndarray (m,)
-        Amplitude of the spring stress (Pa), for machines of the pull (N), per unit amplitude of ln v at `contact`.
+        Amplitude of the spring stress (Pa), or for machines of the pull (N), per unit amplitude of ln v at `contact`.
     contact : ndarray of int (m,)
         Index of the contact at which slip rate oscillates most, relative to its steady value.
     shares : ndarray (m, contacts)

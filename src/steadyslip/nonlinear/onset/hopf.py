@@ -64,8 +64,8 @@ class Onset(Displayed):
         ``supercritical``, ``subcritical``, ``degenerate`` (`coefficient` vanishes in exact arithmetic) or ``not
         decided`` (`coefficient` is below `coefficient_error`).
     coefficient : float
-        c1, growth rate of the amplitude per squared amplitude of ln v (of a machine: at `contact`), 1/s. NaN beyond
-        floating point.
+        c1, growth rate of the amplitude per squared amplitude of ln v (for a machine: at `contact`), 1/s. NaN if it is
+        beyond floating point.
     coefficient_error : float
         Bound of the change of c1 by rounding, that of the rig's own numbers included, 1/s.
     share : float
@@ -75,13 +75,13 @@ class Onset(Displayed):
     growth_slope : float
         Re(dλ/dp), 1/s per unit of the parameter.
     stress_ratio : float
-        Amplitude of the spring stress (Pa) for unit amplitude of ln v; of a machine of the pull at `contact` (N).
+        Amplitude of the spring stress (Pa) for unit amplitude of ln v; for a machine, of the pull at `contact` (N).
     stable : str
         ``above`` or ``below``: the side of the edge on which sliding is stable.
     contact : str
-        Of a machine: where slip oscillates most, as a share of its velocity; else empty.
+        For a machine: the contact whose slip rate oscillates most, relative to its steady value; else empty.
     shares : dict of str to float
-        Of a machine, by contact: amplitude of ln v over that at `contact`.
+        For a machine, by name of the contact: amplitude of ln v there over that at `contact`.
     """
 
     rig: Slider | Machine

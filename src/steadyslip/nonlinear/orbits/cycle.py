@@ -42,7 +42,7 @@ class CycleRange(Displayed):
     amplitude : float
         Half of ln(peak velocity/lowest velocity); infinite where slip stops or reverses.
     force_drop : float
-        Highest minus lowest pull, N.
+        Highest minus lowest pull at the contact, N.
     lowest_normal_force, highest_normal_force : float
         Extreme normal forces, N.
     """

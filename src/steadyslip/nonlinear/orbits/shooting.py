@@ -189,7 +189,7 @@ def multipliers(sensitivities: Array, rates: Array) -> tuple[float, Array]:
     trivial : float
         The multiplier along the motion, which is 1 apart from errors.
     others : ndarray (n-1,), complex
-        By falling size.
+        The other multipliers, by falling size.
 
     Notes
     -----

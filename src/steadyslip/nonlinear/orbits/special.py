@@ -73,8 +73,8 @@ def changes(before: BranchPoint, now: BranchPoint, build: PointBuilder, index: i
 def may_return(earlier: BranchPoint, before: BranchPoint, now: BranchPoint) -> bool:
     """True if a test function may have changed sign twice between the neighbours `before` and `now`.
 
-    That is so if its extrapolation from `earlier` and `before` changes sign, or if a multiplier is closer to the unit
-    circle than it moves in the step.
+    This is assumed if the extrapolation of the test function from `earlier` and `before` changes sign, or if a
+    multiplier is closer to the unit circle than the distance that it moves in the step.
     """
     three = (earlier, before, now)
     lengths = [known.point.length for known in three]

@@ -16,7 +16,7 @@ from steadyslip.linear.allowance import at_a_time, may_take
 from steadyslip.linear.neutral import Sets, argument_at, bound_on_axis, highest, leads
 from steadyslip.linear.roots import Array, ComplexArray, evaluate, quietly
 
-UNKNOWN = -2  # count of roots where counting takes too long
+UNKNOWN = -2  # stands for the number of roots where counting takes too long
 _MOST = 400_000  # most unresolved pieces of the axis, of all rigs together; more would take too much memory (by trial)
 _NEAR = 1e-13  # a piece shorter than this share of its frequency is not cut further: a root lies on it, to rounding
 

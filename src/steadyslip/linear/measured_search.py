@@ -126,7 +126,7 @@ class MeasuredSearch:
         """
         middle = 0.5 * (low + high)
         value, beta = middle, self._at(middle).count.omega
-        if beta <= self.own.response.omega[0]:  # a root that crosses at zero, where nothing is to be followed
+        if beta <= self.own.response.omega[0]:  # the root crosses the axis at zero: no pair to follow
             return middle, 0.0
         for _ in range(_NEWTON):
             step, turn = _STEP * abs(value), _STEP * beta

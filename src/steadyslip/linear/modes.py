@@ -125,7 +125,7 @@ class Mode(Displayed):
         if self.energy:
             shares = {
                 name: round(share, 3) for name, share in self.energy.items()
-            }  # kinetic and elastic are often alike
+            }  # kinetic and elastic energy often have similar shares
             most = max(shares, key=lambda name: shares[name])
             text += WORDS["energy"].format(share=format_percent(shares[most]), name=most.partition(".")[2])
         return text

@@ -102,7 +102,7 @@ def _by_ratios(c: Array, h: Array, sets: Sets, count: int) -> ComplexArray:
 def _starting_values(c: Array, h: Array, sets: Sets) -> ComplexArray:
     """Roots (rows, k) of the polynomial with a Padé approximant in place of exp(−sτ) for every delay τ."""
     k = np.arange(_ORDER + 1)
-    below = np.array([math.comb(_ORDER, i) / math.perm(2 * _ORDER, i) for i in k])  # of exp(x): above, in powers of x
+    below = np.array([math.comb(_ORDER, i) / math.perm(2 * _ORDER, i) for i in k])  # numerator for exp(x)
     late = np.maximum(h @ np.linalg.pinv(sets.astype(float)).T, 0.0)  # (rows, delays)
     total = np.zeros((len(c), c.shape[-1] + _ORDER * sets.shape[-1]))
     for j, acting in enumerate(sets):

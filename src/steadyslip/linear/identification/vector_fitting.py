@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.model.numeric.pencil import ComplexArray
 
-_STEPS = 8  # relocations of poles; from peaks a few suffice
+_STEPS = 8  # number of relocations of the poles; where they start at the peaks, a few suffice
 
 
 def relocated(omega: Array, responses: ComplexArray, weights: Array, poles: ComplexArray) -> ComplexArray:
@@ -60,7 +60,7 @@ def _once(omega: Array, responses: ComplexArray, weights: Array, poles: ComplexA
         own = _real(weights[:, c, None] * np.concatenate([basis, -responses[:, c, None] * basis], axis=1))
         kept.append(np.asarray(np.linalg.qr(own, mode="r"))[count:, count:])
     scale = np.linalg.norm(weights * responses) / len(omega)
-    total = scale * np.sum(basis.real, axis=0)  # keeps the sum from vanishing
+    total = scale * np.sum(basis.real, axis=0)  # row that excludes the solution zero
     rows = np.concatenate([*kept, total[None]])
     wanted = np.append(np.zeros(len(rows) - 1), scale * len(omega))
     sizes = np.linalg.norm(rows, axis=0)

@@ -219,7 +219,7 @@ class Unknowns:
 
     def along(self, expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
         """Total derivative with respect to a variable, with unknowns that change so that the residuals stay zero."""
-        if not self._moves(expression, variable):  # nearly all pairs of many variables
+        if not self._moves(expression, variable):  # true of nearly all pairs when variables are many
             return sp.S.Zero
         own = [derivative(residual, variable) for residual in self.residuals]
         return derivative(expression, variable) + self.followed(expression, own)

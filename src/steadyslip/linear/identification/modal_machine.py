@@ -58,7 +58,7 @@ class ModalMachine:
         inner = rows[:, self.measured.used]
         rest = inner @ total.rest[np.ix_(self.measured.used, self.measured.used)] @ inner.T
         poles = np.concatenate([total.poles, total.poles.conj()])
-        strong = float(np.max(np.abs(contacts(1j * np.array([unit])))))  # N/m: unit of the unknown forces, per unit of motion
+        strong = float(np.max(np.abs(contacts(1j * np.array([unit])))))  # N/m; the unknown forces are divided by it
         n, k = len(contacts.e) + size, len(poles)
         a, e = np.zeros((k + n, k + n), dtype=complex), np.zeros((k + n, k + n), dtype=complex)
         x, u, f = slice(0, k), slice(k, k + size), slice(k + n - size, k + n)

@@ -54,7 +54,7 @@ def stability_chart(
     """Regions of stable, unstable and no steady sliding in the plane of two parameters.
 
     Ill-posed rigs (negative effective mass or direct effect) count as unstable. A region narrower than
-    the spacing of the grid can be missed; the outlines of the others are exact.
+    the spacing of the grid can be missed; the outlines of other regions are exact.
 
     Parameters
     ----------

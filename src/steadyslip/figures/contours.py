@@ -31,7 +31,7 @@ def safety_fields(factor: Array, status: Array) -> list[Array]:
     is an upper limit.
 
     k/(k + k_cr) is bounded, so that contours continue where k_cr is zero or infinite: 1 where every stiffness is
-    stable, 0 where none is. NaN where the nearest limit is of the other kind, and where nothing is known.
+    stable, 0 where no stiffness is. NaN where the nearest limit is of the other kind, or not known.
     """
     with np.errstate(invalid="ignore"):
         share = np.where(np.isinf(factor), 1.0, factor / (1 + factor))

@@ -40,8 +40,8 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     -------
     matplotlib.axes.Axes
         Real and imaginary parts in 1/s and rad/s; colour is k or kp. Diamonds: edges of the stable set; circles:
-        the rig's own eigenvalues, those outside the view listed in the legend. The view is set by the eigenvalues that
-        decide stability; fast ones may lie outside.
+        the rig's own eigenvalues; the legend lists those outside the view. The eigenvalues that decide stability set
+        the view; fast eigenvalues may lie outside.
 
     Raises
     ------

@@ -33,8 +33,8 @@ def map_figure(
 ) -> Any:
     """Draw a map.
 
-    Over two parameters: stable regions, unstable ones and those without steady sliding, with contours of the result; or
-    colours, if the result is not about steady sliding. Over one parameter: the result as a curve, with these regions
+    Over two parameters: regions of stable, unstable and no steady sliding, with contours of the result; or colours, if
+    the result is not about steady sliding. Over one parameter: the result as a curve, with these regions
     shaded. Samples on grids are drawn as median and 95 % band, or as share that is stable; without grids as points. The
     base rig is marked, and the point of the edge of stability nearest to it in the figure.
 

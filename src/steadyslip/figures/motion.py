@@ -54,7 +54,7 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     ----------
     run : History
     ax : three matplotlib Axes, optional
-        New ones by default.
+        New Axes by default.
 
     Returns
     -------
@@ -202,7 +202,7 @@ def phase_plane(
         Label of the run in the legend.
     color : str, optional
     contact : str, optional
-        For machines: name of the contact; by default the one whose slip rate changes most.
+        For machines: name of the contact; by default the contact whose slip rate changes most.
 
     Returns
     -------

@@ -100,7 +100,7 @@ class _Reader:
         if magic not in (b"CDF\1", b"CDF\2"):
             raise FormatError("is not a classic netCDF file")
         self.offset = ">i" if magic == b"CDF\1" else ">q"
-        self.number()  # number of records: not used
+        self.number()  # the number of records, which is not needed
         dims = self.entries(_DIMENSIONS, self.dimension)
         self.dims = list(dims.items())
         attributes = self.entries(_ATTRIBUTES, self.attribute)

@@ -158,7 +158,7 @@ def sensitivity(
 
     Notes
     -----
-    First-order indices by Saltelli et al. (2010, their table 2 b), total ones by Jansen (2 f), from Sobol points, by
+    First-order indices by Saltelli et al. (2010, table 2 b), total indices by Jansen (2 f), from Sobol points, by
     `scipy.stats.sobol_indices`. Where a result does not exist at one of the points of a set, the set is left out; the
     largest power of 2 of the remaining sets is used.
 

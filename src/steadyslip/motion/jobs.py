@@ -214,7 +214,7 @@ def numbers(drive: Any, stress: Any, x: Any, unknown: Any, options: Options) -> 
 def automatic_method(reduction: Reduction, rtol: float = np.inf) -> str:
     """Name of the method for `auto`: explicit for massless models in ln v or asinh, Rosenbrock for stiff others.
 
-    Mass makes the stick phase stiff (rate a/m*), bristles the whole motion. Of the explicit pairs the one of order 8 is
+    Mass makes the stick phase stiff (rate a/m*), bristles the whole motion. Of the explicit pairs, that of order 8 is
     faster at tight tolerances (`benchmarks/methods.py`), but takes minutes to compile if equations are solved in each
     of its stages, or with the many variables of delayed signals.
     """

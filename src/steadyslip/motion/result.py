@@ -229,7 +229,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     def plot(self, kind: str = "history", ax: Any = None, contact: str | None = None) -> Any:
         """Draw the run: ``history`` (velocity, friction and normal stress in time) or ``phase`` (phase plane).
 
-        For a machine, `contact` selects the contact of the phase plane; by default the one that moves most.
+        For a machine, `contact` selects the contact of the phase plane; by default the contact that moves most.
 
         Returns
         -------

@@ -38,7 +38,7 @@ DIGITS = 3  # significant digits of quantities in sentences
 TREND = 0.01  # an oscillation is steady if its swings grow or decay by no more than this in the last half of a run
 LAST = 0.9  # swings that grew before must be alike after this share of a run for an oscillation to be steady
 BEATS = 1.2  # largest ratio of swings of a steady oscillation, which may beat; by trial
-SUDDEN = 10.0  # least ratio of peak to mean velocity of a sudden slip; half sine: 1.6, stick-slip without creep: 2 to 4
+SUDDEN = 10.0  # an event is mostly creep if peak over mean velocity is larger; half sine: 1.6, stick-slip: 2 to 4
 OVER = 2.0  # events have ended if none occurs for this many times the longest recurrence of late events
 ALIKE = 0.01  # largest relative difference of slips, and of recurrences, of events that repeat
 

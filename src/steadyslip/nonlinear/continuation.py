@@ -18,7 +18,7 @@ Equations = Callable[[Array], tuple[Array, Array]]
 """Function of u (n+1,): residuals (n,) and their Jacobian (n, n+1). May raise `Failure`."""
 MOST_ITERATIONS = 10  # limit of Newton iterations for one point
 ASIDE = 10.0  # intermediate Newton iterates must stay within this many times `reach` of the guess
-NEARLY = 1e-5  # relative Newton step below which a larger next step is rounding and not divergence
+NEARLY = 1e-5  # steps below this size may grow without counting as divergence, and end Broyden's method
 CHORDS = 8  # limit of iterations with an earlier Jacobian: beyond it, a new Jacobian takes less time
 GROW, FASTER, SHRINK = (
     1.4,

@@ -52,7 +52,7 @@ TIGHTER, TIGHTEST = 100, 1e-12  # factor by which rtol is reduced where integrat
 MOST_SHARE = 0.99  # largest amplitude tried for limits, over the input's steady value: just below a change of sign
 DECADES = 3  # decades of amplitude below MOST_SHARE that are searched, and as many decades below these where needed
 STEPS = 12  # number of amplitudes tried in that range, each 1.8 times the last: narrower windows may be missed
-HALVINGS = 4  # bisections of the logarithm of amplitude within a step of amplitude: limits are right to 4 %
+HALVINGS = 4  # bisections of the logarithm of amplitude within a step of amplitude: to 4 %
 RISING = Measured(
     "numbers > 0 that rise", lambda given: _positive(given) and bool(np.all(np.diff(np.ravel(given)) > 0)), "s"
 )
@@ -115,8 +115,9 @@ def response(
 
     Notes
     -----
-    Small amplitudes: G(iω) = C(iω − A)⁻¹B + D of `state_space`, exact; with delays late forces are turned by e^(−iωτ)
-    instead. Large ones: the motion is simulated for 10 periods, or as long as transients of small amplitude last, and
+    Small amplitudes: G(iω) = C(iω − A)⁻¹B + D of `state_space`, exact; with a delay τ, forces get a factor e^(−iωτ).
+
+    Large amplitudes: the motion is simulated for 10 periods, or as long as transients of small amplitude last, and
     again for twice as long, until two periods agree to 1e-7 of their range and the rest of a transient is as small;
     gain and phase follow from a discrete Fourier transform of the last period. After 2560 periods, and where
     integration errors are larger even with a smaller tolerance, 1e-5 suffices.
@@ -331,7 +332,8 @@ def _unsettled(apart: list[float]) -> str:
 def _edge(beyond: Callable[[float], bool], most: float) -> float:
     """Smallest amplitude for which `beyond` is true; inf if there is none up to `most`.
 
-    Amplitudes are tried upwards and the first step is bisected: at larger ones motion may be periodic again.
+    Amplitudes are tried upwards, and the first step with a change is bisected: at larger amplitudes motion may be
+    periodic again.
     """
     low = most / 10**DECADES
     if beyond(low):

@@ -63,7 +63,7 @@ def recommendation(
 ) -> Iterator[str]:
     """HTML of the recommended change, with a margin beyond the edge, or to keep the rig; each change is analysed anew.
 
-    With tolerances a rig is kept only if it is stable with a chance of `SURE`; otherwise the changes by `cure` are
+    With tolerances, a rig is kept only if it is stable with a chance of `SURE`; otherwise the changes by `cure` are
     given.
     """
     adjustable = order.adjustable
@@ -260,7 +260,7 @@ def _windows(found: Cures, at: str, whole: bool) -> Iterator[str]:
 def changeable(analysis: Analysis, adjustable: Collection[str] = ()) -> list[Margin]:
     """Margins of the parameters whose change is discussed in a document.
 
-    If the rig is stable these are parameters with an edge, nearest first; otherwise those that could make it stable:
+    If the rig is stable, these are parameters with an edge, nearest first; if not, parameters that could make it so:
     first those within a factor of `FAR`, then by cost (`steadyslip.verdict.change_costs`). Only parameters named in
     `adjustable` are taken; without any, all except those of friction, or else those of friction too.
     """

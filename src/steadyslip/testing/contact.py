@@ -245,7 +245,7 @@ def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = DEFAUL
 def check_linearisation(contact: ContactLaw, surroundings: Surroundings = DEFAULT_SURROUNDINGS) -> None:
     """Check B0...B3 (eq. 12) against central differences of the normal stress, at two stiffnesses.
 
-    Laws with states or compliant surfaces have no such coefficients: see `check_contact_routes`.
+    Laws with states or compliant surfaces have no coefficients B0...B3: see `check_contact_routes`.
 
     Examples
     --------

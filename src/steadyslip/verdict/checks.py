@@ -1,7 +1,7 @@
 """Checks of each number of a verdict by a second, independent computation.
 
 - Steady sliding: with the laws' own methods, forces balance and memory variables are constant.
-- Eigenvalues: the characteristic matrix is singular there; the argument principle counts as many growing ones.
+- Eigenvalues: the characteristic matrix is singular at them; the argument principle counts as many growing ones.
 - Edges: small disturbances grow on one side and decay on the other.
 - Critical stiffness: a root lies on the imaginary axis.
 

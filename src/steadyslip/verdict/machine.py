@@ -79,7 +79,7 @@ def reason(found: Findings) -> str:
     if found.on_edge:
         return PHRASES["undamped"] + hint if found.undamped else PHRASES["on edge"]
     if not found.stable:
-        counted = not found.eigenvalues and found.unstable_roots  # an even number means oscillating pairs
+        counted = not found.eigenvalues and found.unstable_roots  # even: roots in oscillating pairs
         swings = counted % 2 == 0 if counted else any(s.imag for s in found.eigenvalues[:1])
         return PHRASES["oscillatory" if swings else "divergence"] + hint
     return PHRASES["dies out"] + hint

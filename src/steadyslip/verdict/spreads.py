@@ -92,7 +92,7 @@ class Spreads:
     of : dict of str to Spread
         Distributions by dotted name.
     mixing : ndarray (d, d)
-        Lower triangular matrix that turns independent normal numbers into correlated ones.
+        Lower triangular matrix that turns independent normal numbers into correlated numbers.
     """
 
     rig: Slider | Machine

@@ -107,7 +107,7 @@ class Tolerated(ReadOnly):
     corners : int
         Number of corners of the ranges that were tried; 0 if every parameter is distributed normally.
     otherwise : dict of str to float
-        If all drawn rigs have one verdict, values of a rig within the ranges that has the other, by dotted name in SI
+        If all drawn rigs have one verdict, values of a rig within the ranges with the other, by dotted name in SI
         units: a corner, or found by a search from the drawn rig nearest to the edge; empty if none was found.
     """
 

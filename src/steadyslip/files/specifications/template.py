@@ -97,7 +97,7 @@ class RigTemplate:
     pieces : tuple of (str, str)
         Kind and content of consecutive pieces: ``text`` and the text itself; ``value`` and the name of the parameter
         whose value belongs there; ``lines`` or ``table`` and the name of the table whose omitted keys belong there,
-        for ``table`` with a header. Empty if the reader would not find filled-in values (such as with omitted keys of
+        ``table`` with a header. Empty if the reader would not find filled-in values (such as with omitted keys of
         an inline table).
     sources : mapping of str to ParameterSource
         Sources of the parameters that the file gives.

@@ -135,7 +135,7 @@ def nastran_matrices(path: str, file: Path, content: bytes) -> NamedMatrices:
     Raises
     ------
     UnreadableFile
-        If the package that reads it is missing, or it has no such matrices.
+        If the package that reads the file is missing, or the file has no matrices of these kinds.
     """
     try:
         from pyyeti.nastran import bulk, op4
@@ -174,7 +174,7 @@ def _lines(name: str, content: bytes) -> Array:
     Raises
     ------
     UnreadableFile
-        If a line is no such list of numbers.
+        If a line is not a list of so many numbers.
     """
     text = content.decode("ascii", "replace")
     try:

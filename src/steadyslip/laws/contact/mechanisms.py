@@ -152,7 +152,7 @@ class SelfEnergising(PreloadedContact, name="self-energising"):
     Give the gain γ, or the geometry behind it: `wedge_angle` of a wedge that friction drags into its gap
     under a frictionless roof (γ = cot), or `lead_angle` of a thread (γ = tan; see `LeadScrew` for signs
     and load). γ < 0 releases the contact. B0...B3 = −γm, −γ(c + η), −γ, 0 (and B4 = γq). Needs γ f1 < 1
-    and γ μss < 1; the latter is lock-up.
+    and γ μss < 1; with γ μss >= 1 it locks up.
     """
 
     lock_up = "the gain must be below 1/μss = {inverse}"

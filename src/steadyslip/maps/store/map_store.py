@@ -88,7 +88,7 @@ class Store:
         Raises
         ------
         NotAvailable
-            If a file is damaged, missing, or not the one that was written.
+            If a file is damaged, missing, or not the file that was written.
         """
         for number in self._touched(name, region):
             if number not in self._intact and (mark := self._mark(number)):

@@ -96,7 +96,7 @@ def first_crossing(guards: Array, fresh: Array, noise: Array) -> tuple[float, in
     Parameters
     ----------
     guards : ndarray (guards, degree + 1)
-        Polynomial coefficients; leading ones of fresh guards that are below the noise are set to 0 (in place).
+        Polynomial coefficients; first coefficients of fresh guards that are below the noise are set to 0 (in place).
     fresh : ndarray of bool (guards,)
         Guards of the last switch, whose first values are 0 apart from rounding.
     noise : ndarray (guards, 3)

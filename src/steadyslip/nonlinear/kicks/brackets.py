@@ -107,7 +107,7 @@ def threshold_map(
         (see `threshold` for a single rig). After Ctrl-C, NaN too where no kick is known to fail, else the middle of the
         bracket reached. A DataArray has a coordinate ``limit``: the outcome of larger kicks, or ``edge``, ``unstable``,
         ``no steady sliding``, ``out of range`` (of floating point) or ``undecided`` with the reason; ``returns`` where
-        none fails. For machines a coordinate ``contact``: the one that is lost beyond, or fastest in a blow-up.
+        none fails. For machines a coordinate ``contact``: the contact that is lost, or the fastest in a blow-up.
         Dimensions have ``units`` and ``long_name`` of the parameter that varies along them.
 
     Examples

@@ -1,6 +1,7 @@
 """Find closed orbits near the ends of many runs by Newton's method, and their stability from multipliers.
 
-Orbits of one slip event, or one turn, are searched here; longer ones by `orbits.cycle_from_motion`, run by run.
+This module searches for orbits of one slip event, or one turn; `orbits.cycle_from_motion` searches for longer orbits,
+run by run.
 
 The flow over one period and its derivative are computed by runs side by side: one from the state itself, and two for
 each variable (central differences). That is less accurate than the variational equations of `orbits.flow`, but enough
@@ -25,8 +26,8 @@ from steadyslip.nonlinear.orbits.flow import FlowRunner
 BESIDE = 1e-4  # step of finite differences, in natural sizes
 MOST_COMPILED = 18  # largest number of variables times contacts of a rig with structures: 15 take 3 CPU s to compile
 ROUNDS = 8  # limit of Newton iterations
-CLOSED = 1e-6  # an orbit is closed if start and end of a period are closer than this, in natural sizes
-LOOSE = 1e3  # an orbit is closed, too, if they are closer than this number of integration tolerances
+CLOSED = 1e-6  # an orbit is closed if the start and the end of a period are closer than this, in natural sizes
+LOOSE = 1e3  # or if start and end are closer than this multiple of the relative integration tolerance
 ATTRACTS = 1e-3  # smallest distance of multipliers from 1 that finite differences resolve
 WORTH = 0.1  # error of the trivial multiplier above which the other multipliers are not used
 ON = 0.05  # largest distance of the run from the orbit, as a share of the orbit's size

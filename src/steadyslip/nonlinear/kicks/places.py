@@ -147,7 +147,8 @@ def struck(point: OperatingPoint, at: str, change: Any) -> dict[str, Any]:
 def largest_blow(jobs: Jobs, at: str, change: Array) -> float:
     """Size of a blow that stops a contact whose law is for forward slip only; `change`: velocity change at size 1.
 
-    Infinite where it stops no contact with such a law: it accelerates contacts, or their laws allow slip both ways.
+    Infinite where the blow stops no contact with such a law, because it accelerates contacts, or because their laws
+    allow slip both ways.
     """
     model, point, found = jobs.point.model, jobs.point, math.inf
     if not at:  # the block of a slider

@@ -87,7 +87,7 @@ def _balance(reduction: Reduction) -> _Balance:
 def rest_of(jobs: Jobs, velocity: Array, pressure: Array, force: Array | None = None) -> Rest:
     """Steady sliding of the rigs of `jobs` at load-point velocities, added normal stresses and forces (m,).
 
-    Where there are several, it is the one that continues the rig's own as the inputs change.
+    Where several steady states exist, the one that continues the rig's own steady sliding as inputs change is taken.
     """
     force = np.zeros(len(velocity)) if force is None else force
     if jobs.point.model.contacts[0].name:

@@ -330,7 +330,7 @@ def onset_map(
     -------
     dict of str to ndarray or xarray.DataArray
         ``kind`` (index into `KINDS`), ``edge`` (SI; of the gain kp for a rig without spring) and ``coefficient`` (c1,
-        1/s). Without an oscillatory edge ``kind`` is that of ``none``, and the others are NaN.
+        1/s). Without an oscillatory edge ``kind`` is the index of ``none``, and edge and c1 are NaN.
 
     Raises
     ------

@@ -161,7 +161,7 @@ def closing_error(missed: Array, along: Array, period: float, amplitude: float) 
     period : float
         s.
     amplitude : float
-        Size of the cycle, below 1 for small ones.
+        Size of the cycle; below 1 for small cycles.
     """
     late = np.sum(missed * along, axis=1) / np.sum(along * along, axis=1)
     across = np.abs(missed - late[:, None] * along)

@@ -92,7 +92,7 @@ class FlowSetting:
     speed : float
         Slip rate of the watched contact in steady sliding, m/s.
     plain, varied : tuple of ndarray
-        Constants and settings (one row each) of the plain kernel and of the one with sensitivities.
+        Constants and settings (one row each) of the plain kernel, and of the kernel with sensitivities.
     """
 
     value: float

@@ -226,7 +226,7 @@ SIZES = (1e-3, 1e-4, 1e-5, 1e-2)  # distances (in unknowns) of the first doubled
 def doubled_pieces(tracer: Tracer, flips: Sequence[Cycle]) -> list[BranchPiece]:
     """Pieces of cycles of twice the period, one from each doubling in `flips` at which no earlier piece ends.
 
-    The integration steps left are shared equally by the doublings; unused ones go to those that need more. Doublings
+    The integration steps left are shared equally by the doublings; unused steps go to those that need more. Doublings
     of cycles that are stable on one side come first, as their cycles of twice the period may be stable.
     """
     pieces: list[BranchPiece] = []

@@ -67,7 +67,8 @@ class Shooting:
     def curve(self) -> SolutionCurve:
         """Continuation curve of these equations.
 
-        Lengths and angles are those of first state, period and parameter: the other segments are part of one cycle.
+        Lengths and angles along the curve count only the first state, the period and the parameter, because the other
+        segments belong to the same cycle.
         """
         weights = np.ones(self.segments * self.flow.size + 2)
         weights[self.flow.size : -2] = 0.0

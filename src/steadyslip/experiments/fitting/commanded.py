@@ -13,10 +13,10 @@ from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.loading import Change, Course, Loading, resting_rate
 
 STRAIGHT_TOLERANCE = 5e-4  # largest deviation of straight lines from a curve, as a share of its range; chosen by trial
-MAX_PIECES = 30  # largest number of pieces into which an interval between samples is cut
+MAX_PIECES = 30  # largest number of straight lines by which a curve between two samples is approximated
 MIN_RAMP = 1e-9  # shortest duration of a ramp, as a share of the record; a step is computed as a ramp this long
 NORMAL, PORES = 2, 3  # columns of the inputs: normal stress and pore pressure
-SLIDING_SHARE = 1e-3  # duration of steady sliding before an initial rest, as a share of the record; its value is free
+SLIDING_SHARE = 1e-3  # duration of steady sliding before an initial rest, as a share of the record; any value would do
 
 
 class CommandedInputs:

@@ -22,13 +22,13 @@ from steadyslip.experiments.fitting.comparison import Comparison, DataComparison
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.loading.loading import Loading
 
-NODES = 7  # nodes of each polynomial (degree 6)
+NODES = 7  # number of samples through which each polynomial passes (degree 6)
 INTERPOLATION_ERROR = 1e-3
 """Largest interpolation error, relative to the scatter of the residuals for the model, and to the largest value for its
 derivatives."""
 MAX_KEPT_SHARE = 0.5  # samples are condensed if at most this share of them remains
-MAX_REFERENCES = 3  # number of motions from which the nodes are chosen
-MARGIN = 2  # samples kept on both sides of the window of a change
+MAX_REFERENCES = 3  # largest number of motions in which the polynomials must be accurate
+MARGIN = 2  # number of samples that are kept before and after the window of a change
 
 
 class Condensed:

@@ -79,9 +79,9 @@ class Estimate(Displayed):
 UNDETERMINED = 0.5  # data leave a direction open (undetermined) if its standard deviation in coordinates is larger
 MIN_WEIGHT = 0.15  # a combination names parameters of at least this weight: more names would only lengthen the message
 MIN_CHANGE = 0.1  # a parameter is also named if one standard deviation along the direction changes it by this much
-LEAST_CHANGE = 0.01  # an open direction makes a parameter undetermined if it changes its coordinate by more than this
+LEAST_CHANGE = 0.01  # a parameter may be undetermined if an open direction changes its coordinate by more than this
 MOST_REACH = 2.0  # largest change of a coordinate along an open direction: more is not plausible
-OPEN_SHARE = 0.1  # an open direction makes a parameter undetermined if it has more than this share of its variance
+OPEN_SHARE = 0.1  # a parameter is undetermined if more than this share of its variance is along an open direction
 EIGENVALUE_ROUNDING = 1e-13  # eigenvalues of the scaled JᵀJ below this share of the largest are rounding errors
 DERIVATIVE_ROUNDING = 1e-10  # derivatives below this share of the largest are rounding errors of the integration
 
@@ -96,7 +96,7 @@ class Combination:
         Change of each parameter relative to the largest change, which is 1: of the logarithm of a positive parameter,
         or of another parameter over its typical size (0.01 of b, 0.2 of α).
     deviation : float
-        Standard deviation of the parameter with the largest change, in the same measure; inf without a bound.
+        Standard deviation along the direction, as the length of the vector of these changes; inf without a bound.
     """
 
     weights: dict[str, float]

@@ -15,7 +15,7 @@ from steadyslip.experiments.loading.loading import Course
 from steadyslip.experiments.numerics.splitting import displacement_noise, line, spread
 
 RATE_SHARE = 0.02  # smaller relative differences of rates are not reported: calibrations agree to about one percent
-BEYOND = 5.0  # a difference of more standard deviations is not noise of the sensor
+BEYOND = 5.0  # a difference of more than this many standard deviations is not noise of the sensor
 FEWEST = 8  # least number of samples from which a rate is computed
 SETTLED = 0.3  # first share of the time at a rate that is ignored, as a servo may still be settling
 

@@ -14,7 +14,7 @@ from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
 from steadyslip.experiments.numerics.least_squares import DAMPING_NEAR, Minima, minimise
 
-RAMP_SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # durations of trial ramps, as shares of the longest possible
+RAMP_SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # durations of ramps that are tried, over the longest one
 
 
 @dataclass(frozen=True)

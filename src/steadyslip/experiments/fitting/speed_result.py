@@ -28,8 +28,8 @@ from steadyslip.files.specifications.layout import UNKNOWN
 
 BRISTLES, BRISTLE_DAMPING, SLIP = "bristle stiffness", "bristle damping", "slip distance"
 DEFLECTION = (1e-6, 1e-5, 1e-4)
-"""Smallest, usual and largest deflection of bristles before they slip, or slip distance, m: guides and seals yield by
-1 to 50 um (Armstrong-Helouvry 1991)."""
+"""Smallest, usual and largest deflection of bristles before they slip, or slip distance, m: guides and seals deflect by
+1 to 50 um before sliding (Armstrong-Helouvry 1991)."""
 RAD_A_METRE = 10.0  # rad per m of deflection in joints, whose contact is some 10 cm from the axis
 STIFFNESS, MASS, SHAFT, INERTIA = (
     "20 N/um",
@@ -37,9 +37,9 @@ STIFFNESS, MASS, SHAFT, INERTIA = (
     "1e4 N m/rad",
     0.1,
 )  # of a common axis, of a common joint; kg, kg m^2
-COEFFICIENT_LOAD = 1000.0  # N, where a table of coefficients has no load
+COEFFICIENT_LOAD = 1000.0  # load (N) of the rig for a table of coefficients that has no load
 SHARES = ("exponent", "stress share", "immediate share")
-"""Kinds of dimensionless parameters that are not a force per load."""
+"""Kinds of parameters without a unit that are no ratio of a force to the load."""
 CHANGE = "CHANGE: a table of speeds does not determine it"
 
 
@@ -68,7 +68,7 @@ def undetermined(found: SpeedFindings) -> dict[str, tuple[float, float, float]]:
 
 
 def rig_load(found: SpeedFindings) -> float:
-    """Load (N) of the rig: median of the table, `COEFFICIENT_LOAD` for coefficients, or 1 for forces without a load."""
+    """Load (N) of the rig: median of the table; without a load, `COEFFICIENT_LOAD` for coefficients or 1 for forces."""
     if found.table.load is None and found.table.is_coefficient:
         return COEFFICIENT_LOAD
     return found.main.load
@@ -132,7 +132,7 @@ def _lever(found: SpeedFindings) -> float:
 
 
 def _at_radius(found: SpeedFindings, si_unit: str, kind: str) -> float:
-    """Factor that converts a parameter of the law from a radius of 1 m, where rad/s are m/s, to that of the contact."""
+    """Factor that converts a parameter of the law from a radius of 1 m (rad/s are m/s) to the radius of the contact."""
     table = found.table
     if not table.turns or table.radius is None:
         return 1.0
@@ -219,7 +219,7 @@ def _interval(one: DirectionFit, name: str) -> str:
 
 
 def _written(found: SpeedFindings, name: str, value: float) -> str:
-    """TOML value of a parameter, in the units of the table; stiffness and damping of bristles at the rig's load."""
+    """TOML value of a parameter, in the units of the table; bristle stiffness and damping hold at the rig's load."""
     known = parameters(found.main.law)
     own, kind = (known[name].role.unit, known[name].role.kind) if name in known else ("1", "")
     load, value = rig_load(found), value * _at_radius(found, own, kind)
@@ -233,7 +233,7 @@ def _written(found: SpeedFindings, name: str, value: float) -> str:
     return f'"{value:.8g} {own}"'
 
 
-MOST_SCATTER = 1.0  # a law with a larger scatter, as a share of friction, does not describe the rows
+MOST_SCATTER = 1.0  # if the scatter is a larger share of friction, the law does not describe the table
 
 
 def _scattered(found: SpeedFindings) -> list[str]:
@@ -248,7 +248,7 @@ def _scattered(found: SpeedFindings) -> list[str]:
     ]
 
 
-CLOSE = 0.95  # pairs of parameters are listed from this correlation of their errors
+CLOSE = 0.95  # pairs of parameters are listed if the correlation of their errors is larger
 
 
 def words(found: SpeedFindings) -> str:
@@ -307,7 +307,7 @@ def _direction(found: SpeedFindings, one: DirectionFit) -> list[str]:
 
 
 def _difference(one: DirectionFit) -> str | None:
-    """Line on the change of friction with ln v, if the direct effect of the law is held; else None."""
+    """Line on the change of friction with ln v, if the direct effect of the law is fixed; else None."""
     kinds = {address.role.kind: (name, address.value) for name, address in parameters(one.law).items()}
     (a, direct), (b, _) = kinds.get("direct effect", ("", None)), kinds.get("evolution effect", ("", None))
     found = [estimate for estimate in one.estimates if estimate.name == b]
@@ -327,7 +327,7 @@ def _end(value: float, si_unit: str) -> str:
 
 
 def _together(one: DirectionFit) -> list[str]:
-    """Line on pairs of parameters with highly correlated errors; empty if there are none."""
+    """Line on pairs of parameters with highly correlated errors; no line if there is no such pair."""
     names = [estimate.name for estimate in one.estimates]
     pairs = [
         f"{names[i]} and {names[j]} ({one.correlation[i, j]:+.3f})"
@@ -339,7 +339,7 @@ def _together(one: DirectionFit) -> list[str]:
 
 
 def as_dict(found: SpeedFindings) -> dict[str, Any]:
-    """Data of a fit for JSON in SI units; None for ends that do not exist."""
+    """Data of a fit for JSON in SI units; None for ends of intervals that do not exist."""
     data: dict[str, Any] = {"source": found.table.source, "law": found.law, "notes": list(found.table.notes)}
     for name, one in (("forward", found.forward), ("backward", found.backward)):
         if one is None:

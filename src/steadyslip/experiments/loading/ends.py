@@ -14,8 +14,8 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.experiments.numerics.splitting import RESOLUTION
 
-OFF_LINE = 6.0  # a sample is off a line beyond this number of standard deviations
-ON_LINE = 3.0  # a sample is on a line within this number of standard deviations
+OFF_LINE = 6.0  # a sample is off a line if it deviates by more than this number of standard deviations
+ON_LINE = 3.0  # a sample is on a line if it deviates by at most this number of standard deviations
 RATE_SIGMAS = 4.0  # two rates are different if they differ by more than this number of standard errors
 UNKNOWN_RATE = 0.1  # a rate with a larger relative error counts as unknown; chosen by trial
 REST_SHARE = 0.1  # few samples count as at rest below this share of the next rate, if 0 is within the error; by trial

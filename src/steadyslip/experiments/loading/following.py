@@ -22,9 +22,9 @@ LONGEST_LAG = 0.2  # largest lag, as a share of the time around a change in whic
 SPARED = 14.0  # decrease of chi squared credited to a servo for each sensor level, or half a run, that it replaces
 COARSE = 0.5  # the best start of a servo's search has at least this share of the decrease of chi squared at its end
 AROUND = 3.0  # samples are near a change up to this many settling times of the servo before and after it
-NEAR = 30.0  # samples on each side of a change that are not averaged
+NEAR = 30.0  # number of samples on each side of a change that are not averaged
 PER_EFOLD = 10.0  # further away, number of means per increase of the distance from the change by e; chosen by trial
-LEFT = 4.0  # standard errors by which the mean misfit around a change may exceed 1 (its mean for normal noise is 0.83)
+LEFT = 4.0  # standard errors by which the mean misfit around a change may exceed 1 (for normal noise, 0.83 is expected)
 MOST_DESCRIBED = 4000  # the correlation of the noise is estimated from at most this many samples, to limit the time
 
 

@@ -28,15 +28,15 @@ AT_REST, STILL = 1e-3, 7e-4
 whole travel, as sensors drift in a hold; chosen by trial. A run at 1 um/s in a record with 1 mm/s is no hold."""
 SLOW = 0.02  # a run up to this share of the highest rate is a hold if 0 is within the error; chosen by trial
 MOST_CHANGES = 40  # largest number of changes in a piecewise linear loading; with more, a curve is used; by trial
-MOST_BETWEEN = 0.35  # largest share of the time between runs in a piecewise linear loading; chosen by trial
-ENOUGH_SAMPLES = 30  # least number of samples that determine their noise; chosen by trial
+MOST_BETWEEN = 0.35  # a loading is piecewise linear if at most this share of its time is between runs; chosen by trial
+ENOUGH_SAMPLES = 30  # least number of samples from which their noise is estimated; chosen by trial
 BRIEF_RUN = 0.3  # a run shorter than this share of a neighbour may be part of a servo's response; chosen by trial
 MOST_BRIEF = 4  # largest number of brief runs that are left out, the shortest first: a record hardly has more
 LAG_ERROR = 0.1  # error in the time of a command that a servo follows, as a share of the lag
 SUDDEN = 5  # largest number of samples in a glitch; number of samples on each side of a slip that give its size
 LASTING = 2.0  # from this number of samples per independent sample, noise counts as correlated: runs are found again
-EXACTLY = 1e-9  # deviations below this share of a column's range are rounding
-EXACT = 1e-2  # a time is not fitted if its error is below this number of sampling intervals
+EXACTLY = 1e-9  # deviations below this share of a column's range are rounding errors
+EXACT = 1e-2  # the time of a change is not fitted if its error is below this number of sampling intervals
 
 
 def load_course(time: Array, displacement: Array, blurred: bool = False) -> Course:

@@ -30,7 +30,7 @@ BESIDE = 5.0
 240 records of steps and servos with white and correlated noise no mean was off by more than 4.7; in records of load
 points that creep, stick or have two time constants, means are off by 11 and more."""
 ELSEWHERE = 1.3  # the mean must also exceed all means of as many residuals far from changes by this factor
-SHORTEST, WINDOWS = 4, 20  # samples of the shortest mean; number of means far from changes needed to know their scatter
+SHORTEST, WINDOWS = 4, 20  # samples in the shortest means; least number of means far from changes for their scatter
 DENSE, GROWTH = 4, 1.25  # nodes one sampling interval apart on each side of a change; growth of the distances beyond
 SHARE = 0.45  # largest share of the time to the next change that a change may take: the rest determines the lines
 BEGUN = 0.05  # the time of a change is that at which this share of it is done

@@ -14,7 +14,7 @@ from steadyslip.experiments.numerics.smoothing import Smooth, smoothing_curve
 from steadyslip.experiments.numerics.splitting import FEWEST, level_noise, split
 
 LEAST_STRESS = 2e-3  # smallest relative change of normal stress that counts as a commanded change; chosen by trial
-OFF_LEVEL = 6.0  # a sample is off a level beyond this number of standard deviations
+OFF_LEVEL = 6.0  # a sample is off a level if it deviates by more than this number of standard deviations
 SUDDEN, NEAR = 0.7, 3
 """A change is sudden if the means of this number of samples (second) just before and after it differ by at least this
 share (first) of the change; chosen by trial."""
@@ -22,9 +22,9 @@ CLIMB = 0.2  # samples climb if the means of their halves differ by more than th
 BINS = 40  # number of means into which a span is divided to test whether it is constant; chosen by trial
 UNEVEN = 3.0  # a span is not constant if the variance of its means exceeds that of noise by this factor; by trial
 EARLIEST_STEP = 1e-6  # least time between a sample and a step after it, as a share of the sampling interval
-SLOW = 400  # knots of a curve between two changes: faster variation counts as noise; chosen by trial
-PER_PERIOD = 60  # knots per period of an oscillation; chosen by trial
-OSCILLATION = 8  # a stress oscillates from this number of sign changes; chosen by trial
+SLOW = 400  # number of knots of a curve between two changes: faster variation counts as noise; chosen by trial
+PER_PERIOD = 60  # number of knots of such a curve in a period of an oscillation; chosen by trial
+OSCILLATION = 8  # a stress oscillates if it crosses its mean at least this often; chosen by trial
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,11 @@ from steadyslip.experiments.numerics.splitting import MAD_TO_SIGMA, displacement
 RATE_SIGMAS = 4.0  # two rates are different if they differ by more than this number of standard errors
 LIKE = 0.02  # two rates are equal if their relative difference is smaller; chosen by trial
 LEAST_CHANGE = 0.05  # smallest relative change of rate that counts as a change; chosen by trial
-BACK = 5.0  # a displacement is back on a line within this number of standard errors
+BACK = 5.0  # a displacement is back on a line if it deviates by at most this number of standard errors
 LONGEST_GLITCH = 0.2  # longest glitch, as a share of the record's time and of its travel; chosen by trial
-CHANGE = 3.0  # cost of a change of rate, in units of a misfit of `RATE_SIGMAS` standard errors; chosen by trial
-FRAGMENT = 0.1  # cost of leaving out a piece, in addition to the cost of its length; chosen by trial
-SHORTEST = 0.05  # leaving out this share of the record (time or travel) costs as much as a change; chosen by trial
+CHANGE = 3.0  # cost of a change of rate; a rate that is off by `RATE_SIGMAS` standard errors costs as much; by trial
+FRAGMENT = 0.1  # cost of leaving out a piece, in addition to a cost that grows with its length; chosen by trial
+SHORTEST = 0.05  # to leave out this share of the record (time or travel) costs as much as a change; chosen by trial
 SLIP = 0.01  # longest slip of the sensor, as a share of the record's time; chosen by trial
 MAIN = 0.6  # of the samples left out between two pieces, at least this share must be in a separate run; by trial
 LEAD = 8.0  # two runs differ if their rates make this difference of travel, in standard deviations of noise; by trial

@@ -9,8 +9,8 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.format import format_count, format_quantity
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen
 
-GAP = 10.0  # an interval is noted as a gap from this multiple of the usual spacing; chosen by trial
-RESTART = 0.02  # the clock restarted if more than this share of consecutive rows has times before the latest; by trial
+GAP = 10.0  # an interval is noted as a gap if it exceeds this multiple of the usual spacing; chosen by trial
+RESTART = 0.02  # a clock restarted if more than this share of the rows, successive ones, is before the latest time
 COARSE, EVEN = 0.6, 1.25
 """A clock may be coarser than the sampling if a smaller share of the rows (first number) has distinct times, and if the
 range of times minus evenly spaced times is smaller than the second number, in ticks of the clock."""

@@ -10,7 +10,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.numerics.splitting import level_noise, spread
 
-SHORTEST = 3  # least number of equal samples in a row that count as cut off
+SHORTEST = 3  # least number of successive equal samples that may show a limit of the channel
 CHANCE = 1e-6  # largest probability that a run of equal samples occurs in the record by chance
 GAP = 5  # runs at most this many samples apart are one peak: noise brings the channel below its limit for a moment
 PLATEAU, QUIET = 10, 0.3
@@ -18,11 +18,11 @@ PLATEAU, QUIET = 10, 0.3
 white noise about a peak, has a plateau that long and that quiet once in 1e7 cases."""
 STILL = 1e-3  # a channel stands still if it changes by less than this share of its median change between samples
 CLIPPED = "at a limit of the channel"
-BESIDE = 2  # neighbours on each side with which a sample is compared
+BESIDE = 2  # number of neighbours on each side with which a sample is compared
 WILD_SIZE, WILD_RANGE = 20.0, 4.0
 """A sample is faulty if it is further from the median of its neighbours than both limits: the first in standard
 deviations of the noise (as `OUTLIER_SIZE`), the second in ranges of the neighbours, as these differ at a true peak."""
-AFTER = 4  # samples after a change of the loading in which friction may have a peak of a single sample
+AFTER = 4  # number of samples after a change of the loading in which a single high sample may be a peak of friction
 LARGEST_DIRECT = 0.05  # largest height of a true peak after a rate change by a factor e: twice the direct effect `a`
 WILD = "far off the samples beside"
 OFF_FIT = "so far off the fit that half of its misfit and more was there"

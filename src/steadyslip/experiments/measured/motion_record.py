@@ -40,7 +40,7 @@ class MotionRecord(ReadOnly):
         Values in SI units by the name that a simulated run of the machine uses: ``table.x``, ``motor.v``,
         ``guide.friction_force``, ``links.screw.force``.
     units : dict of str to str
-        Unit that each column had in the file; empty text for a column made from an array in SI units.
+        Unit that each column had in the file; empty text for columns that were already in SI units.
     source : str
     notes : tuple of str
         Notes on everything that was noticed or changed.

@@ -28,7 +28,7 @@ MANY_SLIPS = 3  # a wave is also looked for if this many slips and glitches were
 ROUNDS = 2  # times that wave and lines are fitted in turn: without the wave, changes of the rate are located better
 TURNS = 12  # fixed-point iterations for the position; each multiplies the error by up to 2 pi amplitude / period
 STEPS = 20  # most evaluations of a nonlinear fit of a wave: a real wave takes 2 to 4, noise takes hundreds
-OUTLIER = 4.0  # samples are ignored beyond this many standard deviations
+OUTLIER = 4.0  # samples that deviate by more than this many standard deviations are ignored
 AFTER, SETTLED = 0.05, 6.0
 """Part of a run that is ignored at its start, as the servo may still be settling: the share of the run in the first
 number, and the second number times the lag of the servo."""

@@ -127,7 +127,7 @@ def decimal_marks(names: Sequence[str], columns: Iterable[Iterable[str]]) -> tup
     return marks, notes, None
 
 
-DAY = 86_400.0  # s
+DAY = 86_400.0  # length of a day, s
 _CLOCK = re.compile(r"^(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)(?: ?([AaPp])\.?[Mm]\.?)?$")
 _STOPWATCH = re.compile(r"^(\d{1,3}):([0-5]\d[.,]\d+)$")  # minutes and seconds, 1:30.5; hours have no fraction
 _DAYS = (

@@ -142,7 +142,7 @@ def population_files(
     if given is not None and len(given) != len(records):
         message = f"got {len(given)}; allowed: {len(records)}, one for each record"
         raise ParameterError([Problem("population.values", message)])
-    plan = plan.referred_to(records[0])  # levels of friction must refer to the same velocity
+    plan = plan.referred_to(records[0])  # levels of friction must refer to one velocity in all fits
     fits: dict[str, Fit] = {}
     with progress_text("searching") as said:
         for label, record in zip(labels, records, strict=True):

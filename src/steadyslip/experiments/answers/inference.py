@@ -87,7 +87,7 @@ def inference_data(
             shape["dims"][name] = [f"{name}.time"]
             shape["coords"][f"{name}.time"] = time
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "More chains", UserWarning)  # there are many short chains on purpose
+        warnings.filterwarnings("ignore", "More chains", UserWarning)  # posteriors have many short chains on purpose
         known = hasattr(arviz, "InferenceData")
         found = arviz.from_dict(**groups, **shape) if known else arviz.from_dict(groups, **shape)
     for name, unit in units.items():

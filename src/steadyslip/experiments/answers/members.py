@@ -137,7 +137,7 @@ class Axes:
                 change[inner[1], inner] = np.array([slopes[0], *(-x for x in slopes[1:])]) / size
                 covariance = change @ covariance @ change.T
                 values[inner[1]] = (levels[0] - sum(levels[1:])) / size
-            elif replaced in seen:  # b is known but a is not: a − b follows from the other experiments
+            elif replaced in seen:  # this fit determines b but not a: other experiments give a − b
                 kept = [i for i, p in enumerate(seen) if p != replaced]
                 seen, values = [seen[i] for i in kept], values[kept]
                 covariance = covariance[np.ix_(kept, kept)]

@@ -294,7 +294,7 @@ def step_table(
             rig, free = (plan.rig, plan.free) if part.stress_changes else _without_memory(fit, i)
             try:
                 own = options | {"weights": weights}
-                if part.time[0] > record.time[0]:  # friction may still be changing after the step before
+                if part.time[0] > record.time[0]:  # friction may still change after the previous step
                     own |= _begun(before or (fit, i), make_plan(rig, part, free, **own))
                 alone = search_fit(rig, part, free, progress=progress, **own)
                 before = (alone, 0) if all(one.determined for one in alone.estimates) else None
@@ -368,7 +368,7 @@ def _begun(before: tuple[Fit, int], plan: Plan) -> dict[str, Any]:
     away = np.column_stack([whole[:, at] - steady[name][:, 0] for name, whole in source.states(values).items()])
     if not np.all(np.isfinite(away)):
         return {"initial": "free"}
-    spread = np.linalg.svd(away[1:] - away[0], full_matrices=False)  # as many directions as there are differences
+    spread = np.linalg.svd(away[1:] - away[0], full_matrices=False)  # one direction per difference
     directions = (spread.S[:, None] * spread.Vh).tolist()
     known = Beginning(dict(zip(steady, away[0].tolist(), strict=True)), tuple(map(tuple, directions)))
     return {"initial": "steady", "beginnings": (known,)}

@@ -450,7 +450,7 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     begin = np.clip(fit.coordinates + 0.5 * width * generator.standard_normal((walkers, size)), low, high)
     sampler, time = run_walkers(log_probability, begin, steps, seed, "posterior sampling")
     cut = {"discard": steps // 3, "thin": max(1, int(time / 2))}
-    kept = sampler.get_chain(**cut).swapaxes(0, 1).reshape(-1, size)  # one walker after another
+    kept = sampler.get_chain(**cut).swapaxes(0, 1).reshape(-1, size)  # sorted by walker
     probable = sampler.get_log_prob(**cut).T.ravel()
     details = {
         "acceptance": float(np.mean(sampler.acceptance_fraction)),

@@ -178,7 +178,7 @@ class CommandedInputs:
         if self.resting is not None:  # steady sliding, then a hold until the record begins
             before = low - times[:, -1:] - np.array([[SLIDING_SHARE * (high - low), 0.0]])
         nodes = np.hstack([np.clip(events, low, high), before, np.tile(self.nodes, (jobs, 1))])
-        order = np.argsort(nodes, axis=1, kind="stable")  # a step sorts before a sample at the same time
+        order = np.argsort(nodes, axis=1, kind="stable")  # a step comes before a sample at the same time
         moving = nodes[:, : nodes.shape[1] - len(self.nodes)]
         curves = {channel: self._curve_values(channel, moving, order) for channel in self._curves}
         nodes = np.take_along_axis(nodes, order, axis=1)

@@ -148,7 +148,7 @@ class _Interpolation:
             i, j = waiting.pop()
             if j - i < 2 * NODES:
                 nodes = np.arange(i, j + 1)
-                # all samples are kept, in groups that keep the band of the matrix narrow
+                # all samples are kept, in small groups so that the band of the matrix remains narrow
                 for k in range(0, len(nodes) - 1, NODES - 1):
                     part = nodes[k : k + NODES]
                     self.elements.append(_Element(int(part[0]), int(part[-1]), part, np.eye(len(part))))
@@ -211,7 +211,7 @@ class _Interpolation:
         """
         rest = weights * (data - self._interpolate(predicted))
         gathered = self._transpose(weights * rest)
-        lower = np.zeros_like(self.upper)  # the transposed factor, in the banded storage of lower triangles
+        lower = np.zeros_like(self.upper)  # the transposed Cholesky factor, stored as bands
         for k in range(NODES):
             lower[k, : lower.shape[1] - k] = self.upper[NODES - 1 - k, k:]
         own = np.asarray(solve_banded((NODES - 1, 0), lower, gathered))

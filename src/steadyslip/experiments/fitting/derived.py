@@ -136,7 +136,7 @@ def _of_rig(space: Space, rig: Slider, record: int, calibrated: float | None, pl
         edge, share = (
             np.broadcast_to(np.asarray(number(rig, own)), len(places)) for number in (critical_stiffness, safety_factor)
         )
-    except (NotAvailable, ParameterError):  # a law without an edge of stability, or impossible values among draws
+    except (NotAvailable, ParameterError):  # the law has no edge of stability, or values are impossible
         edge = share = np.full(len(places), np.nan)
     found.append(_Derived("k_c", "Pa/m", edge, True, set(own) - {"slider.stiffness"}, levels))
     found.append(_Derived("k/k_c", "1", share, True, set(own), levels))

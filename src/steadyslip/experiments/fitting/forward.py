@@ -137,7 +137,7 @@ class Forward:
     def values(self, parameters: Array) -> OperatingPoint:
         """Operating points for values (jobs, names) of the free parameters."""
         varied = {name: parameters[:, i] for i, name in enumerate(self.names)}
-        if self.rig.axial_stiffness is not None:  # k follows from other parameters
+        if self.rig.axial_stiffness is not None:  # the stiffness k follows from other parameters
             return operating_point(self.rig, varied)
         named = self._base.named() | varied
         return self._base.with_arguments(named.values(), (len(parameters),))
@@ -235,7 +235,7 @@ class Forward:
         if len(found) <= LANES:
             work(0, len(found))
         elif not run_many(work, len(found), self.effort.threads, LANES, lanes=LANES):
-            raise KeyboardInterrupt  # missing runs must not count as failed
+            raise KeyboardInterrupt  # runs that were not made must not count as failed
         self.effort.budget.spend(np.sum(taken, axis=1) + SAMPLE_WORK * len(table.times), 1 + chain.shape[1])
         if self.effort.growth < np.inf:
             ended = np.sum(taken[np.isfinite(found[:, 0, -1])], axis=1)

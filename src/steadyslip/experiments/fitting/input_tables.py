@@ -93,7 +93,7 @@ def _kinks(time: Array, displacement: Array) -> list[tuple[int, float]]:
     unlike[2:-2] = np.abs(slopes[1:-3] - slopes[:-4]) + np.abs(slopes[4:] - slopes[3:-1])
     change = np.abs(after - before)
     with np.errstate(all="ignore"):
-        share = (slopes - after) / (before - after)  # of the interval that lies before the kink
+        share = (slopes - after) / (before - after)  # share of the interval before the kink
         clear = (change > 20 * unlike) & (change > 1e-3 * np.max(np.abs(slopes))) & (share > 1e-6) & (share < 1 - 1e-6)
     return [(int(i), float(time[i] + share[i] * (time[i + 1] - time[i]))) for i in np.flatnonzero(clear)]
 
@@ -162,12 +162,12 @@ class MeasuredInputs:
         order = np.argsort(moments, kind="stable")
         places = np.array(cuts, dtype=int)[order]
         nodes = np.insert(time, places + 1, np.array(moments, dtype=float)[order]) - self.origin
-        samples = np.insert(np.arange(len(time)), places + 1, -1)  # sample at each node; -1 for none
+        samples = np.insert(np.arange(len(time)), places + 1, -1)  # index of the sample at each node; -1 if none
         old = np.maximum.accumulate(np.where(samples >= 0, samples, 0))[:-1]  # interval of each row
         rows = np.zeros((1, len(nodes) - 1, 9))
         rows[0, :, 0], rows[0, :, 1] = nodes[:-1], nodes[1:]
         self._set_measured_inputs(rows[0], record, old, pressed, jumping, samples >= 0)
-        halves = np.flatnonzero(samples[:-1] < 0)  # second parts of cut intervals
+        halves = np.flatnonzero(samples[:-1] < 0)  # rows that are the second part of a divided interval
         self.moving = np.array([row for row in halves if float(time[old[row]]) in jumping], dtype=int)
         for row in halves:
             first = float(time[old[row]])
@@ -181,7 +181,7 @@ class MeasuredInputs:
         spacing = np.diff(record.time)
         if record.displacement is not None:
             rows[:, 3] = (np.diff(record.displacement) / spacing)[old]
-        if record.integrated and record.velocity is not None:  # the velocity was measured: it varies linearly
+        if record.integrated and record.velocity is not None:  # a measured velocity varies linearly between samples
             slope = (np.diff(record.velocity) / spacing)[old]
             rows[:, 3] = record.velocity[old] + slope * (rows[:, 0] - (record.time[old] - self.origin))
             rows[:, 6] = slope

@@ -132,7 +132,7 @@ def _waves(fit: FitNumbers) -> list[str]:
         wavy = wavy and whiteness([moved - load.integral(record.time)]).p < STRUCTURE
         if not (many or wavy):
             continue
-        if yielding(record.time, moved, record.friction, load) is not None:  # reported by another warning
+        if yielding(record.time, moved, record.friction, load) is not None:  # another warning reports this
             continue
         late = ", the lag of a servo" if any(one.lag for one in load.changes) else ""
         size = format_quantity(load.strays, "m", 2)

@@ -70,7 +70,7 @@ def equal_memories(
     others = product(*plan.rig.friction.decided_besides.values())
     found: list[Rival] = []
     laws = [plan.rig.friction]
-    for form in ((), *others):  # the evolution law of the plan first
+    for form in ((), *others):  # the first form keeps the evolution law of the plan
         if found and max(one.remedy.gain for one in found) < STRONG_EVIDENCE:
             break  # the records do not determine the memory
         new = [own for own in _with_memory(plan, form) if own.rig.friction not in laws]

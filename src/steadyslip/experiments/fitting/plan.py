@@ -223,7 +223,7 @@ class Plan:
         if not self.pressed or record.normal is None:
             return rig, None
         stress = None if self.drive == "measured" else self.loading[i].stress
-        if stress is not None and not self.follows:  # a protocol moves the load point, the record has the normal stress
+        if stress is not None and not self.follows:  # a protocol and a measured normal stress
             pressed = stress.at(record.time)
             rig = _pressed_with(rig, float(pressed[0]))
             return rig, (record.normal if stress.changes else pressed) - pressed[0]

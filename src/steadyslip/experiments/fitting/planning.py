@@ -64,7 +64,7 @@ def make_plan(
     problems: list[Problem] = []
     known = can_be_free(rig, plan_protocol)
     names = _default_free(rig) if free is None else resolved("free", free, known, problems)
-    if free is not None:  # the level of friction is never known in advance: it is free even if not named
+    if free is not None:  # the level of friction is free even if it is not named, as it is never known
         names = [*names, *(name for name in rig.of_kind("friction level") if name in known and name not in names)]
     held = resolved("fixed", fixed, rig.parameters(), problems)
     names = [name for name in dict.fromkeys(names) if name not in held]
@@ -83,7 +83,7 @@ def make_plan(
         many = tuple(without_wave(record) for record in many)
     if weights is None:
         many = tuple(without_clipped(record) for record in many)
-        if options.get("loss", "linear") == "linear":  # with other losses, wild samples have little weight
+        if options.get("loss", "linear") == "linear":  # other losses give outliers little weight
             many = tuple(without_wild(record) for record in many)
         many, options["weights"] = _averaged(many)
     if options.get("calibrated") is not None:

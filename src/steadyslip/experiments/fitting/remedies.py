@@ -148,7 +148,7 @@ def mended(plan: Plan, ssq: float, values: Mapping[str, float]) -> bool:
         except NotAvailable:
             continue
         if best.ssq > wanted:
-            continue  # describing the noise would take longer than this search
+            continue  # this fit is not better: skip the noise model, which takes longer
         if remedy(plan, own, best.comparison, best.coordinates, ssq, size).gain > STRONG_EVIDENCE:
             return True
     return False

@@ -209,7 +209,7 @@ def unit_of(role: Parameter, table: SpeedTable, bent: bool) -> str:
     `bent` is true for parameters to which friction is not proportional (scales and exponents).
     """
     shown = role.unit
-    if shown == "N":  # a load
+    if shown == "N":  # the parameter is a load
         return "N m" if table.load_turns else "N"
     if table.load is None and not table.is_coefficient and not bent:
         shown = {"1": "N", "s/m": "N s/m"}.get(shown, shown)

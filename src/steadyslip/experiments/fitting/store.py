@@ -137,7 +137,7 @@ def result_of(
     )
     _check(table, fit)
     model = np.concatenate([found[f"model_{i}"] for i in range(1, len(noises) + 1)])
-    fit.__dict__["model"] = read_only(model)  # from the file, so that it is not computed again
+    fit.__dict__["model"] = read_only(model)  # taken from the file to save its computation
     return fit
 
 
@@ -226,7 +226,7 @@ def from_table(table: ExpectedTable, made: type[S]) -> S:
                                               for i in range(len(records))))  # fmt: skip
     refits = stored["refits"]
     fit = result_of(table, found, stored, partial(made, joint=refits["joint"]), plan)
-    stored_results = {  # results from the file, so that they are not computed again
+    stored_results = {  # taken from the file to save their computation
         "as_measured": next(iter(refits["measured"]), None),
         "as_ramps": tuple(RampFit(*one) for one in refits["ramps"]),
         "remedies": tuple(Remedy(*one) for one in refits["remedies"]),

@@ -71,7 +71,7 @@ def _weighed(plan: Plan, noise: Array) -> Plan:
     if not np.max(noise) > LEAST_RATIO * np.min(noise):
         return plan
     mean = np.average(np.log(noise), weights=[len(record) for record in plan.records])
-    sizes = noise / np.exp(mean)  # makes sums of squares comparable between weights
+    sizes = noise / np.exp(mean)  # so that sums of squares with different weights can be compared
     return replace(plan, weights=tuple(row / size for row, size in zip(_weights(plan), sizes, strict=True)))
 
 

@@ -53,7 +53,7 @@ def run_at_start(time: Array, displacement: Array, run: Line, noise: float) -> i
     rate, first = run.rate, run.first
     while first > 0 and abs(off[first - 1]) <= ON_LINE * noise:  # earlier samples on the line belong to the run
         first -= 1
-    if first < 2 or np.any(np.abs(off[:2]) <= OFF_LINE * noise):  # one sample has no rate
+    if first < 2 or np.any(np.abs(off[:2]) <= OFF_LINE * noise):  # a single sample does not determine a rate
         return 0
     for count in range(first, 1, -1):
         own, x = t[:count], off[:count]

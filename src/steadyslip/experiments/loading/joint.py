@@ -276,7 +276,7 @@ def _fitted(samples: SensorSamples, start: Array, responses: _Responses, extra: 
     """Robust nonlinear fit of the times and of the `extra` parameters of the response, which are last in `start`."""
     count, inside = len(start) - extra, samples.time[[1, -2]]  # outside these times, a change would have no effect
     start = np.append(np.clip(start[:count], *inside), start[count:])
-    known: list[tuple[Array, Array, Array, Array]] = []  # last response, kept for the derivatives at the same place
+    known: list[tuple[Array, Array, Array, Array]] = []  # last response, reused for derivatives at the same point
 
     def response(own: Array) -> tuple[Array, Array, Array]:
         if not known or not np.array_equal(own, known[0][0]):

@@ -127,7 +127,7 @@ def _at_rest(rates: Array, runs: list[Run], errors: list[float], time: Array, di
     slow = np.array([SLOW if len(run.rows) >= ENOUGH_SAMPLES else REST_SHARE for run in runs]) * top
     travel = np.abs(rates) * [time[run.last - 1] - time[run.first] for run in runs]
     still = (np.abs(rates) <= AT_REST * top) & (travel <= STILL * np.ptp(displacement))
-    known = np.where(rates < 0, np.inf, 4 * np.array(errors))  # slow and backward: drift of the sensor in a hold
+    known = np.where(rates < 0, np.inf, 4 * np.array(errors))  # a slow backward motion is drift of the sensor in a hold
     rest = still | (np.abs(rates) <= np.minimum(known, slow))
     return np.asarray(rest & (len(runs) > 1))
 

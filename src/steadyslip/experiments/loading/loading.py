@@ -173,7 +173,7 @@ class Course(ReadOnly):
         knots = [c.time + t for c in self.changes for since, length, _ in c.ramps for t in (since, since + length)]
         inner = [k for k in knots if time[0] < k < time[-1]]
         grid = np.unique(np.concatenate([time, inner]))
-        middle = 0.5 * (grid[1:] + grid[:-1])  # the midpoint rule is exact: each interval is in one level or ramp
+        middle = 0.5 * (grid[1:] + grid[:-1])  # the midpoint rule is exact within a level or ramp
         gone = np.concatenate([[0.0], np.cumsum(self.at(middle) * np.diff(grid))])
         return np.asarray(gone[np.searchsorted(grid, time)])
 

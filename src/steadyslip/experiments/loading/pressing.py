@@ -64,7 +64,7 @@ def stress_course(time: Array, normal: Array) -> Course:
         if _is_not_constant(normal[span], noise):
             curves.append(_curve_on_span(time[span], normal[span], level, noise, SLOW))
     errors = np.array([noise / np.sqrt(span.stop - span.start) for span in spans])
-    errors[noise <= 2e-7 * abs(levels[0])] = 0.0  # no noise but rounding: levels are exact
+    errors[noise <= 2e-7 * abs(levels[0])] = 0.0  # levels with rounding errors only are exact
     return Course(levels[0], changes, errors, JoinedCurves(curves) if curves else None, noise)
 
 
@@ -176,7 +176,7 @@ def _change(time: Array, normal: Array, last: int, first: int, levels: list[floa
     if len(t) < FEWEST:
         begin, end = float(np.clip(begin, early, t[0])), float(np.clip(end, t[-1], late))
     unsure = OFF_LEVEL * noise / abs(slope)
-    if unsure < 1e-2 * float(np.median(np.diff(time))):  # known to a hundredth of a sampling interval
+    if unsure < 1e-2 * float(np.median(np.diff(time))):  # the time is known to a hundredth of a sampling interval
         return Change(begin, end - begin, before, after, begin, begin, end - begin, end - begin)
     low, high = begin - unsure, begin + unsure
     return Change(begin, end - begin, before, after, low, high, 0.5 * (end - begin), end - begin + 2 * unsure)
@@ -226,7 +226,7 @@ def oscillation(time: Array, normal: Array) -> StressWave | None:
         return None
     gaps = np.diff(time[turns])
     typical = float(np.median(gaps))
-    like = np.abs(gaps - typical) < 0.35 * typical  # half periods are regular; chosen by trial
+    like = np.abs(gaps - typical) < 0.35 * typical  # half periods of regular length; chosen by trial
     if np.mean(like) < 0.8:
         return None
     first = max(int(np.flatnonzero(np.abs(normal - mean) > band)[0]) - 1, 0)

@@ -279,7 +279,7 @@ def _segmented(pieces: _Pieces) -> list[list[int]]:
     own[-1] = int(np.argmin(total[-1]))
     for k in range(count - 1, 0, -1):
         own[k - 1] = origin[k, own[k]]
-    inside = cost[everyone, own] < price * (1 - 1e-9)  # smaller by more than rounding
+    inside = cost[everyone, own] < price * (1 - 1e-9)  # lower by more than rounding errors
     inside |= everyone == own
     found: list[list[int]] = []
     for k in range(count):

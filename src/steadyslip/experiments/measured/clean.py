@@ -224,7 +224,7 @@ def _separated_times(si: dict[str, Array], lines: Array, notes: list[str]) -> tu
 
 def _local_median(spacing: Array) -> Array:
     """Median spacing in blocks of 51 intervals, so that a lower sampling rate is not taken for a series of gaps."""
-    block = 51  # intervals; chosen by trial
+    block = 51  # number of intervals in a block; chosen by trial
     if len(spacing) < 2 * block:
         return np.full(len(spacing), np.median(spacing))
     count = len(spacing) // block

@@ -396,7 +396,7 @@ def _samples_wanted(record: Record, count: int) -> Array:
         share = 0.3 if i == 0 and len(moments) > 1 else 1.0  # fewer samples for the sliding before the first change
         weight += (
             share * np.where(after, 1.0 / (np.maximum(time - moment, 0.0) + 5 * usual), 0.0) / 8.0
-        )  # about ln(duration / 5 spacings): weighs each change like the whole record
+        )  # 8 is about ln(duration / 5 spacings): each change has the weight of the record
     share = weight * np.gradient(time)
     if count >= n:
         return np.ones(n)

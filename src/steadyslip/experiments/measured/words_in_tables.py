@@ -31,7 +31,7 @@ def without_words(raw: bytes, role_of: Callable[[str], str | None]) -> tuple[byt
     ParameterError
         If a needed column holds words other than directions.
     """
-    if len(raw) > LARGE:  # a table of speeds has a few rows
+    if len(raw) > LARGE:  # tables of speeds have few rows, so this is none
         return raw, []
     lines = decoded(raw)[0].splitlines()
     rows = [(i, line) for i, line in enumerate(lines) if line.strip() and line.lstrip()[:1] not in ("#", "%")]

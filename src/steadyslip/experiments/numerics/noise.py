@@ -365,5 +365,5 @@ def whiteness(residuals: Iterable[Array]) -> Whiteness:
         if lags > 1 and np.ptp(own) > 0:
             left = min((own, first_order(own).innovations), key=lambda one: portmanteau(one, lags))
             statistic += portmanteau(left, lags) + portmanteau(left**2, lags)
-            degrees += 2 * lags - 2  # two coefficients were fitted
+            degrees += 2 * lags - 2  # two coefficients of the noise model were fitted
     return Whiteness(statistic, degrees)

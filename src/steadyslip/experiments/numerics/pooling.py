@@ -117,7 +117,7 @@ def log_evidence(experiments: list[ExperimentEstimate], covariance: Array) -> tu
     count, size = covariance.shape[:2]
     width = size * len(experiments[0].design)
     precision, pull, rest = np.zeros((count, width, width)), np.zeros((count, width)), np.zeros(count)
-    for many in {len(one.indices) for one in experiments} - {0}:  # experiments with equally many estimates at once
+    for many in {len(one.indices) for one in experiments} - {0}:  # experiments with equally many estimates together
         alike = [one for one in experiments if len(one.indices) == many]
         seen = np.array([one.indices for one in alike])
         slopes = np.array([one.slopes(size) for one in alike])
@@ -197,7 +197,7 @@ def correlation_root(bends: Array, size: int) -> Array:
     """Lower triangular roots (m, p, p) of correlation matrices, from artanh of partial correlations (m, p(p−1)/2)."""
     root = np.zeros((len(bends), size, size))
     partial = np.tanh(bends)
-    left = np.ones((len(bends), size))  # squared length that is left of each row, which has length 1
+    left = np.ones((len(bends), size))  # of the squared length 1 of each row, the part not yet used
     k = 0
     for i in range(size):
         for j in range(i):

@@ -9,7 +9,7 @@ from steadyslip.core.arrays import Array
 EVIDENCE = 60.0  # a split must reduce the squared misfit by this many noise variances; by chance it is far less
 MAD_TO_SIGMA = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 FEWEST = 4  # least number of samples in a range
-RESOLUTION = 1e-7  # smallest assumed noise of a column, as a share of its range or largest value: that of single precision
+RESOLUTION = 1e-7  # smallest assumed noise of a column, as a share of its range or largest value
 MAX_RANGES = 500  # largest number of ranges into which a column is divided
 MAX_SWEEPS = 4  # largest number of passes that adjust the ends of the ranges
 BRIEFLY = 33  # number of means whose median motion is the usual one; brief motions last less than half as many means

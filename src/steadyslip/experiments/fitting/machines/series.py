@@ -117,7 +117,7 @@ class MotionModel:
             progress=False,
         )  # fmt: skip
         if np.any(found.status == "interrupted"):
-            raise KeyboardInterrupt  # missing runs must not count as failed
+            raise KeyboardInterrupt  # runs that were not made must not count as failed
         self.effort.budget.spend((found.steps + found.rejected).astype(float), 1)
         return np.concatenate([found.samples[name] for name in self.names], axis=1)
 

@@ -91,7 +91,7 @@ def decimal_marks(names: Sequence[str], columns: Iterable[Iterable[str]]) -> tup
     fault : str or None
         Description of an ambiguity; None if there is none.
     """
-    found: list[dict[str, str]] = []  # by column: an example for each mark
+    found: list[dict[str, str]] = []  # for each column, an example of a number with each mark
     unclear: list[tuple[int, str]] = []
     grouped: list[tuple[int, str]] = []
     for k, cells in enumerate(columns):
@@ -105,7 +105,7 @@ def decimal_marks(names: Sequence[str], columns: Iterable[Iterable[str]]) -> tup
             grouped.append((k, split))
     everywhere = set().union(*found)
     usual = COMMA if COMMA in everywhere else POINT
-    if not everywhere and unclear:  # only numbers such as 1,234: taken as decimals
+    if not everywhere and unclear:  # all numbers are like 1,234: the mark is taken as decimal
         everywhere = {POINT if POINT in cell else COMMA for _, cell in unclear}
         usual = next(iter(everywhere))
     if unclear and len(everywhere) > 1:

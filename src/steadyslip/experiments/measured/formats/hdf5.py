@@ -51,7 +51,7 @@ def numbers_in(path: Path, items: Iterable[Any]) -> None:
     for item in items:
         if item.is_virtual or item.external:
             raise NotAvailable(f"dataset {item.name!r} takes its numbers from another file; copy them into this one")
-        size += (item.size or 0) * -(-item.dtype.itemsize // 8)  # in doubles, for rows of any type
+        size += (item.size or 0) * -(-item.dtype.itemsize // 8)  # counted in units of 8 bytes, for rows of any type
         check_size(path, size, "; name a group with table=")
 
 

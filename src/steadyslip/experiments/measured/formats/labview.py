@@ -77,7 +77,7 @@ def _table(
         raise NotAvailable(
             f"{str(path)!r}: its channels were sampled at different times; export them with one time column"
         )
-    labels = dict(enumerate(header.get("Y_Unit_Label", []), start=1))  # column 0 is the time
+    labels = dict(enumerate(header.get("Y_Unit_Label", []), start=1))  # column 0 is the time, without a label
     units = [known_unit(labels.get(k, "")) for k in places]
     if each != "No" and times:
         clock = values[times[0]]

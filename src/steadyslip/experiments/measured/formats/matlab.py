@@ -43,9 +43,9 @@ def read(path: Path, table: str | None) -> Table:
         _check_unpacked(path)
         found = loadmat(path, squeeze_me=True, struct_as_record=True)
         variables = {name: _from_scipy(value, DEEPEST) for name, value in found.items() if not name.startswith("__")}
-    except NotImplementedError:  # version 7.3
+    except NotImplementedError:  # SciPy does not read version 7.3
         variables = _of_version_73(path)
-        if not variables:  # HDF5 of another program
+        if not variables:  # an HDF5 file that another program wrote
             from steadyslip.experiments.measured.formats import hdf5
 
             return hdf5.read(path, table)
@@ -175,7 +175,7 @@ def _parts(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if all(isinstance(one, Mapping) for one in value):
         for field in value[0]:
             cells = [one.get(field) for one in value]
-            if all(_is_numbers(one) and one.size == 1 for one in cells):  # one row per structure
+            if all(_is_numbers(one) and one.size == 1 for one in cells):  # each structure is a row of a table
                 yield f"{name}.{field}", np.array([one.item() for one in cells])
         if any(isinstance(one, dict | list) or one.size > 1 for member in value for one in member.values()
                if not isinstance(one, str)):  # fmt: skip

@@ -146,7 +146,7 @@ def names_and_units(lines: Sequence[Sequence[str]], count: int) -> tuple[list[st
     rows = [([*cells], _as_units(cells)) for cells in lines]
     named = [cells for cells, units in rows if units is None] or [rows[-1][0]]
     names = named[-1]
-    if len(set(names)) <= count / 2:  # a line that repeats words, such as raw, raw, computed: not the names
+    if len(set(names)) <= count / 2:  # a line of repeated words (raw, raw, computed) is not the names
         names = max(named, key=lambda cells: len(set(cells) - {""}))
     stated = [units for cells, units in rows if units is not None and cells is not names]
     return names, stated[-1] if stated else [None] * count

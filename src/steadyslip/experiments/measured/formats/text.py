@@ -182,7 +182,7 @@ def _read_with_numpy(path: Path, raw: bytes) -> Table | None:
         return None
     try:
         layout = _layout(path, head)
-    except NotAvailable:  # no numbers in this part
+    except NotAvailable:  # the first part of the text has no numbers
         return None
     first = layout.body[0][0]
     if layout.moments or layout.delimiter == "|":
@@ -246,7 +246,7 @@ def cells_of(line: str, delimiter: str | None, least: int = 1) -> list[str]:
     cells = [cell.strip() for cell in found]
     if delimiter == "\t" or (len(cells) > 1 and cells[-1] == ""):
         while len(cells) > least and cells[-1] == "":
-            cells.pop()  # trailing delimiters
+            cells.pop()  # empty cells after trailing delimiters
     return cells
 
 

@@ -110,7 +110,7 @@ def fit(
     initial : str, optional
         ``steady``: a record begins with steady sliding at the first rate and normal stress. ``free``: it slides at that
         rate but not steadily; the initial differences from steady sliding of friction (``initial.friction``) and of
-        each memory of it (``initial.Theta``, e-folds of state) are fitted for each record. A record that begins at rest
+        the logarithm of each state (``initial.Theta``) are fitted for each record. A record that begins at rest
         has ``start.hold`` in any case. For a machine, ``free`` fits the initial displacements and velocities of all
         bodies (``initial.table.x``), as in a ring-down.
     loss : str, optional
@@ -174,8 +174,9 @@ def search_fit(
     """Fit of a rig to records as by `fit`, without the short refits that the text of a fit reports.
 
     If the displacement around changes deviates from the commanded loading, either the load point moved as measured, or
-    the sensor has glitches. Both loadings are fitted, and the one with the smaller residuals of friction is taken. A
-    displacement with a wave that repeats with travel is treated in the same way.
+    the sensor has glitches. The first loading is fitted. If that fails or leaves structure in the residuals, the second
+    is fitted too, and the fit with the smaller residuals is taken. If a wave was removed from a displacement and the
+    fit leaves structure, it is replaced by a fit driven by the smoothed displacement, provided that this leaves none.
     """
     search: Any = {"errors": errors, "starts": starts, "effort": effort, "threads": threads, "progress": progress}
     plan = make_plan(rig, records, free, errors=errors, starts=starts, effort=effort, **options)
@@ -227,7 +228,7 @@ def _without_structure(fit: Fit, other: Callable[[], Fit]) -> Fit:
 
 
 def _fit_either(rig: Slider, records: Sequence[Record], free: Sequence[str] | None, **options: Any) -> Fit:
-    """Fit with the better of two loadings: the load point as measured around changes, or as commanded."""
+    """Fit with a load point that moves as measured around changes or, if that is worse or fails, as commanded."""
     fits, problems = [], []
     for own in ([_followed(record, pieces) for record in records] for pieces in (True, False)):
         try:

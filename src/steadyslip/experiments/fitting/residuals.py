@@ -17,7 +17,7 @@ MAX_EXCESS = 1.0  # largest relative excess of scatter over the noise model; exc
 
 
 def residual_checks(fit: Fitted) -> tuple[Check, ...]:
-    """Checks of the sum of squares, of the convergence and of the noise model behind the errors."""
+    """Checks of the sum of squares, the convergence, and the noise model from which errors are computed."""
     r = fit.scaled_residuals
     missed = abs(float(r @ r) - fit.ssq) / fit.ssq if fit.ssq else float(np.any(r))
     ended = fit.search.converged and not fit.search.cut

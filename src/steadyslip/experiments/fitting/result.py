@@ -32,7 +32,7 @@ class Fit(FitNumbers):  # noqa: D101 -- its base has it
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """Checks of the sum of squares, of the convergence and of the noise model behind the errors."""
+        """Checks of the sum of squares, the convergence, and the noise model from which errors are computed."""
         return residual_checks(self)
 
     def to_dict(self) -> dict[str, Any]:

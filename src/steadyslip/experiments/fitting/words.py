@@ -290,7 +290,7 @@ def _rivals(fit: FitNumbers, best: Remedy) -> str:
 
 
 def _consequence(fit: FitNumbers, best: Remedy) -> str:
-    """Clause that says whether to use the fitted values: only if the better model changes them by less than errors."""
+    """Clause that says whether to use the fitted values: only if the better model changes them within their errors."""
     choices = [one.choice for one in (best, *_near(fit, best))]
     if all(any(f"fit.{word} =" in choice for choice in choices) for word in ("trend", "states")):
         return (
@@ -323,7 +323,7 @@ def _asked(fit: FitNumbers, one: Remedy) -> str:
 
 
 def _moved(fit: FitNumbers, one: Remedy) -> list[str]:
-    """Relative changes of the law's parameters and the stiffness in another model, and its a − b beside the fit's."""
+    """Relative changes of the law's parameters and the stiffness in another model, and its a − b next to the fit's."""
     own = weakening(fit.rig(0), fit.values)
     levels = [] if own is None or WEAKENING not in one.values else [
         f"{WEAKENING} {one.values[WEAKENING]:.2g} in place of {own:.2g}"

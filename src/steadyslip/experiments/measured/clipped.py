@@ -23,7 +23,7 @@ WILD_SIZE, WILD_RANGE = 20.0, 4.0
 """A sample is faulty if it is further from the median of its neighbours than both limits: the first in standard
 deviations of the noise (as `OUTLIER_SIZE`), the second in ranges of the neighbours, as these differ at a true peak."""
 AFTER = 4  # number of samples after a change of the loading in which a single high sample may be a peak of friction
-LARGEST_DIRECT = 0.05  # largest height of a true peak after a rate change by a factor e: twice the direct effect `a`
+LARGEST_DIRECT = 0.05  # largest height of a true peak after a rate change by a factor e: twice the largest a of rocks
 WILD = "far off the samples beside"
 OFF_FIT = "so far off the fit that half of its misfit and more was there"
 OUTLIER_SIZE = 20.0  # smallest residual of an outlier, in root mean squares of the other residuals

@@ -215,7 +215,7 @@ class _Profile:
 
 
 def _end(profile: _Profile, limit: float, step: float) -> float:
-    """Value at which a profile finally exceeds a limit; infinite if it stays below the limit within the bounds.
+    """Value, farthest from the minimum, at which a profile rises to a limit; infinite if it does not within the bounds.
 
     The first step of the search is `step` long; its sign is the side of the minimum.
     """

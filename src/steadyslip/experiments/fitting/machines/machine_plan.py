@@ -30,7 +30,7 @@ STEP = 1e-4
 1e-9 of the motion causes an error of 1e-5 in a derivative; for a ring-down of 50 periods, truncation causes as much."""
 ROUGH_STEP = 1e-3  # step of one-sided differences of motions that are integrated with a large tolerance
 TIME_SPAN = 10.0  # a time of the protocol is searched within this many hundredths of the record on both sides
-SPAN = 1e4  # a parameter is searched from the machine's value over this factor to this multiple of the value
+SPAN = 1e4  # a parameter is searched between the machine's value divided by, and multiplied by, this factor
 
 Model = Callable[[Mapping[str, Array], Mapping[str, Array], int], Array]
 

@@ -43,7 +43,7 @@ class MachineFit(Fitted):
 
     @property
     def checks(self) -> tuple[Check, ...]:
-        """Checks of the sum of squares, of the convergence and of the noise model behind the errors."""
+        """Checks of the sum of squares, the convergence, and the noise model from which errors are computed."""
         return residual_checks(self)
 
     @property

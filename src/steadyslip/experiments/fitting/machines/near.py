@@ -35,7 +35,7 @@ FEWEST_FOLLOWED = 10  # least number of samples in such a part
 MOST_ITERATIONS = 100  # most iterations on whole records; longer searches are in a valley that the record leaves open
 ROUGH_RTOL = 1e-6  # relative tolerance of the integration in the first parts
 ROUGH_HOPE = 100.0  # fits to a first part with more than this multiple of the best sum of squares are dropped
-HELD_BACK = 1e-4  # penalty for a change of a parameter by e: as much as this mean square of relative residuals
+HELD_BACK = 1e-4  # penalty if a parameter changes by a factor e, as a mean square of residuals over their size
 ELSEWHERE, RISE = 0.1, 2.0
 """Two minima are different if they are farther apart than the first number in a coordinate, and if the sum of squares
 halfway between them exceeds theirs by at least the second number as a factor."""

@@ -10,6 +10,7 @@ import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting import numbers, refit
 from steadyslip.experiments.fitting.estimates import Combination
+from steadyslip.experiments.fitting.fit import search_fit
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.remedies import Remedy
 from steadyslip.experiments.fitting.result import Fit
@@ -126,6 +127,24 @@ def test_a_fit_of_means_is_read_back_with_its_loading(tmp_path):
     assert fit.plan.records[0].worth is not None
     fit.save(tmp_path / "fit.nc")
     same(ss.load_fit(tmp_path / "fit.nc"), fit)
+
+
+def test_a_record_that_was_cleaned_is_not_cleaned_again(tmp_path):
+    """After a clipped peak and wild samples one more looked wild: samples and model were of two lengths."""
+    chance = np.random.default_rng(10)
+    steps = (ss.protocol.VelocityStep(at=60.13, to=5e-6), ss.protocol.VelocityStep(at=110.37, to=1e-6))
+    found = lab.columns(lab.rig(), ss.Protocol(pieces=steps, until=180.0), 1500)
+    friction = found["friction"] + lab.NOISE * chance.standard_normal(1500)
+    wild = chance.choice(1500, 8, replace=False)
+    friction[wild] += chance.choice([-1, 1], 8) * chance.uniform(0.005, 0.05, 8)
+    friction = np.minimum(friction, np.quantile(found["friction"], 0.985))
+    fit = search_fit(ss.lab_rig(), ss.record_from_arrays(**(found | {"friction": friction})), starts=3)
+    assert len(fit.plan.records[0]) < 1500
+    fit.save(tmp_path / "fit.nc")
+    again = ss.load_fit(tmp_path / "fit.nc")
+    assert again.samples == fit.samples
+    np.testing.assert_array_equal(again.residuals, fit.residuals)
+    assert str(again) == str(fit)
 
 
 def test_a_fit_is_checked_by_its_residuals(tmp_path):

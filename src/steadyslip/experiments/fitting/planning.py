@@ -41,9 +41,13 @@ NEVER_FREE = ("drive.velocity", "slider.area")
 
 def make_plan(
     rig: Slider, records: Any, free: Sequence[str] | None = None, *, fixed: Sequence[str] = (),
-    separate: Sequence[str] = (), protocol: Any = None, beginnings: tuple[Beginning, ...] = (), **options: Any,
+    separate: Sequence[str] = (), protocol: Any = None, beginnings: tuple[Beginning, ...] = (),
+    clean: bool = True, **options: Any,
 ) -> Plan:  # fmt: skip
     """Plan from the arguments of `steadyslip.fit`, and from the `beginnings` of records if these are known.
+
+    Clipped samples, wild samples and waves are taken out of the records, and very long records are averaged, unless
+    `clean` is False, as for the records of an earlier plan: what is left of them may look clipped or wild again.
 
     Raises
     ------
@@ -79,9 +83,9 @@ def make_plan(
         options["weights"] = _checked_weights(weights, many, problems)
     if problems:
         raise ParameterError(problems)
-    if plan_protocol is None and options.get("drive", "commanded") == "commanded":
+    if clean and plan_protocol is None and options.get("drive", "commanded") == "commanded":
         many = tuple(without_wave(record) for record in many)
-    if weights is None:
+    if clean and weights is None:
         many = tuple(without_clipped(record) for record in many)
         if options.get("loss", "linear") == "linear":  # other losses give outliers little weight
             many = tuple(without_wild(record) for record in many)

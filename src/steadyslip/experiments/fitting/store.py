@@ -344,7 +344,7 @@ def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, 
         plan = make_plan(
             rig, records, free, fixed=[name for name in rig.of_kind("friction level") if name not in free],
             protocol=protocol_from_text(text, source) if commanded else None,
-            drive="commanded" if commanded else drive, weights=weights, **options,
+            drive="commanded" if commanded else drive, weights=weights, clean=False, **options,
         )  # fmt: skip
     except SteadyslipError as error:
         raise table.fault(f"its rig or options are refused: {error}") from error

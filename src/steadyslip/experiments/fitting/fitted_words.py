@@ -59,7 +59,8 @@ def fitted_warnings(fit: Fitted) -> list[str]:
         found.append(
             f"residuals jump by {fit.jump:.0f} standard deviations of their noise, as where a sudden slip of a record "
             "is not followed, or the model slips where the record does not: the numbers have no errors; search with "
-            "more (starts), or leave out what is beyond that slip (between), in which a machine's mass plays its part"
+            "more (starts), with a trend if friction drifts (trend), or leave out what is beyond that slip (between), "
+            "in which a machine's mass plays its part"
         )
     elif fit.search.cut:
         found.append(_cut_off(fit))
@@ -71,8 +72,8 @@ def fitted_warnings(fit: Fitted) -> list[str]:
         )
     elif not fit.search.converged:
         found.append(
-            "the search was stopped before it ended: the numbers are rough and have no errors; give it more work "
-            "(effort) or other starts (starts), or hold what is known (fixed)"
+            "the search was stopped before it ended: the numbers are rough and have no errors; hold what is known "
+            "(fixed), or give it more work (effort) or other starts (starts)"
         )
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:

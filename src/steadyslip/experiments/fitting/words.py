@@ -355,6 +355,8 @@ def _equal_memories(fit: FitNumbers) -> str:
 def _open_memory(fit: FitNumbers) -> list[str]:
     """Warning with advice on how to determine a memory of normal stress that the records do not determine."""
     lost = {name for one in fit.unidentified for name in one.weights if "normal_memory." in name}
+    if not forgets_changes(fit.plan):  # another memory that fits as well has parameters that this law lacks
+        lost &= set(fit.names)
     if not lost:
         return []
     if not any(record.stress_changes for record in fit.plan.records):

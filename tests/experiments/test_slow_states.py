@@ -49,7 +49,7 @@ def test_the_range_of_slip_that_a_less_b_is_of_is_printed():
 
 def test_a_choice_is_listed_once():
     twice = [remedies.Remedy("fit.trend = 1", 1.0, gain, 0.4, {}) for gain in (7.0, 9.0, 8.0)]
-    assert [one.gain for one in remedies._ranked(twice)] == [9.0]
+    assert [one.gain for one in remedies.ranked(twice)] == [9.0]
 
 
 @pytest.mark.campaign

@@ -149,6 +149,16 @@ def test_models_that_nearly_tie_are_both_named(ahead, told):
     assert (f"hardly distinguished from it: friction.evolution = 'aging' (BIC {ahead:.1f} more, a +" in said) is told
 
 
+def test_models_are_ranked_with_one_number_of_independent_samples():
+    """Prakash and Clifton's memory, whose residuals seemed to be less correlated, was told in place of the true one."""
+    true = Remedy("friction.normal_memory = 'linker-dieterich'", 6.04e-5, 211.0, 0.8, {}, independent=260.0, added=1)
+    other = Remedy("friction.normal_memory = 'prakash-clifton'", 6.24e-5, 550.0, 0.8, {}, independent=670.0, added=2)
+    ranked = remedies.ranked([other, true], ssq=1.42e-4)
+    assert [one.choice for one in ranked] == [true.choice, other.choice]
+    assert ranked[0].gain == pytest.approx(260 * np.log(14.2 / 6.04) - np.log(260))
+    assert ranked[1].gain == pytest.approx(260 * np.log(14.2 / 6.24) - 2 * np.log(260))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("errors", "told"),

@@ -8,7 +8,7 @@ evolution law, a memory may be needed although the law of the fit needs none.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -18,7 +18,7 @@ from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.equal_minima import AS_GOOD, NEAR, EqualMinimum
 from steadyslip.experiments.fitting.growing import stress_alone
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, remedy, with_words
+from steadyslip.experiments.fitting.remedies import STRONG_EVIDENCE, Remedy, on_common_terms, remedy, with_words
 from steadyslip.experiments.fitting.search import ROUGH_PATIENCE
 from steadyslip.experiments.fitting.starts import features_of, search_bounds
 from steadyslip.experiments.numerics.least_squares import LOST, Minima, minimise
@@ -77,6 +77,8 @@ def equal_memories(
         laws += [own.rig.friction for own in new]
         near = [one for own in new for one in _rivals(plan, own, ssq, values, most)]
         found += [one for one in near if np.any(one.far(space, deviations, NEAR))]
+    alike = on_common_terms([one.remedy for one in found], ssq)
+    found = [replace(one, remedy=own) for one, own in zip(found, alike, strict=True)]
     return sorted(found, key=lambda one: -one.remedy.gain)
 
 

@@ -25,6 +25,7 @@ from steadyslip.experiments.fitting.remedies import (
     Remedy,
     continued,
     mended,
+    ranked,
     remedies,
     slow_state,
 )
@@ -170,7 +171,10 @@ class FitNumbers(Fitted):  # noqa: D101 -- its base has it
         near = self.coordinates + np.array([one.shift(self.space) for one in equal]).reshape(-1, len(self.space))
         same = replace(self, covariance=covariance, unidentified=self.unidentified + found,
                        joint=self._joint(self._minimum, covariance, near))  # fmt: skip
-        same.__dict__["remedies"] = tuple(one.remedy for one in rivals)
+        own = [one.remedy for one in rivals]
+        if max((one.gain for one in own), default=0.0) >= STRONG_EVIDENCE:  # sizes of memories were held, not fitted
+            own = list(ranked([*(better or remedies(self.plan, self.ssq, self.values, 1)), *own], self.ssq))
+        same.__dict__["remedies"] = tuple(own)
         return same
 
     def _without_weakening(self) -> Self:

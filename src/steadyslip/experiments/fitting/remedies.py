@@ -7,7 +7,7 @@ not show which law or channel is wrong. Fits with another law, a lag or a trend 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import product
 
 import numpy as np
@@ -70,6 +70,10 @@ class Remedy:
         Probability from the whiteness test of the residuals.
     values : dict of str to float
         Values of all unknowns, by name, and of `WEAKENING` (for the first record) if the law has a and b.
+    independent : float
+        Number of independent samples in its residuals; NaN in a fit that was read from a file.
+    added : int
+        Number of its unknowns minus that of the fit.
     """
 
     choice: str
@@ -77,6 +81,8 @@ class Remedy:
     gain: float
     p: float
     values: dict[str, float]
+    independent: float = field(default=np.nan, compare=False, repr=False)
+    added: int = field(default=0, compare=False, repr=False)
 
 
 def remedies(plan: Plan, ssq: float, values: Mapping[str, float], rounds: int = ROUNDS) -> tuple[Remedy, ...]:
@@ -122,7 +128,7 @@ def remedies(plan: Plan, ssq: float, values: Mapping[str, float], rounds: int = 
         if best is None or best[0].gain <= max([STRONG_EVIDENCE, *(one.gain for one in found if one is not best[0])]):
             break
         base, values = best[1], best[0].values
-    return _ranked(found)
+    return ranked(found, ssq)
 
 
 def _is_mended(tried: Iterable[Remedy]) -> bool:
@@ -162,8 +168,35 @@ def continued(plan: Plan, ssq: float, values: Mapping[str, float]) -> float:
         return ssq
 
 
-def _ranked(found: list[Remedy]) -> tuple[Remedy, ...]:
+def on_common_terms(found: Sequence[Remedy], ssq: float) -> list[Remedy]:
+    """Remedies with gains for one number of independent samples, that of the least sum of squares.
+
+    With the number of each, noise of that number alone would decide between models that follow the records as well.
+
+    Parameters
+    ----------
+    found : sequence of Remedy
+    ssq : float
+        Sum of squares of the fit that they may replace.
+    """
+    known = [one for one in found if np.isfinite(one.independent)]
+    if not known:
+        return list(found)
+    count = min(known, key=lambda one: one.ssq).independent
+    return [
+        replace(one, gain=_gain(ssq, one.ssq, one.added, count)) if np.isfinite(one.independent) else one
+        for one in found
+    ]
+
+
+def _gain(ssq: float, least: float, added: int, independent: float) -> float:
+    """Decrease of BIC from one sum of squares to another, for numbers of added unknowns and independent samples."""
+    return independent * float(np.log(ssq / least)) - added * float(np.log(max(independent, 2.0)))
+
+
+def ranked(found: Sequence[Remedy], ssq: float = np.nan) -> tuple[Remedy, ...]:
     """Remedies without duplicates, the best first; a second state that is hardly better than a trend comes after it."""
+    found = on_common_terms(found, ssq)
     trend = any("fit.trend" in one.choice for one in found)
     own = {one.choice: one for one in sorted(found, key=lambda one: one.gain)}.values()
     ahead = {one.choice: STRONG_EVIDENCE * (trend and "fit.states" in one.choice) for one in own}
@@ -239,11 +272,12 @@ def remedy(plan: Plan, own: Plan, comparison: Comparison, z: Array, ssq: float, 
     parts = [r[where] for where in comparison.slices]
     worth = sum(len(part) / max(describe(part).inflation, 1.0) for part in parts)
     least = float(r @ r)
-    gain = worth * float(np.log(ssq / least)) - (len(space) - size) * float(np.log(max(worth, 2.0)))
+    added = len(space) - size
     ends = dict(zip((one.name for one in space.unknowns), map(float, space.values(z)), strict=True))
     if (level := weakening(own.rig, ends)) is not None:
         ends[WEAKENING] = level
-    return Remedy(_choice(plan, own), least, gain, whiteness(parts).p, ends)
+    gain = _gain(ssq, least, added, worth)
+    return Remedy(_choice(plan, own), least, gain, whiteness(parts).p, ends, worth, added)
 
 
 def weakening(rig: Slider, values: Mapping[str, float]) -> float | None:
@@ -318,7 +352,8 @@ def slow_state(
     if not np.isfinite(ends.ssq[0]):
         return None
     found = remedy(with_trend, own, comparison, ends.coordinates[0], ssq, len(with_trend.space()))
-    return replace(found, choice=_choice(plan, own), gain=gain + found.gain)
+    added = len(own.space()) - len(plan.space())
+    return replace(found, choice=_choice(plan, own), gain=gain + found.gain, added=added)
 
 
 def _evolving(plan: Plan) -> tuple[str, ...]:

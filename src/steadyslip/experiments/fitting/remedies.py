@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -83,6 +84,10 @@ class Remedy:
     values: dict[str, float]
     independent: float = field(default=np.nan, compare=False, repr=False)
     added: int = field(default=0, compare=False, repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Dict for JSON with what is stored of it."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.compare}
 
 
 def remedies(plan: Plan, ssq: float, values: Mapping[str, float], rounds: int = ROUNDS) -> tuple[Remedy, ...]:

@@ -477,7 +477,7 @@ def as_dict(fit: FitNumbers) -> dict[str, Any]:
         "derived": {one.name: estimate_dict(one) for one in fit.derived},
         "driven_by": drive_line(fit),
         "rms": fit.rms,
-        "remedies": [vars(one) for one in fit.remedies],
+        "remedies": [one.to_dict() for one in fit.remedies],
         "warnings": warnings(fit),
         "notes": {record.source: list(record.notes) for record in fit.plan.records},
     }
